@@ -1,0 +1,85 @@
+//! Plain geometry that several stages share: boxes in plan and exact sums.
+//!
+//! All lengths are metres in the survey's local frame (see [`crate::open::Frame`]): x east, y north,
+//! z up, relative to an origin near the survey, so that `f64` keeps nanometres.
+
+pub use glam::DVec3;
+
+/// A rectangle in plan, metres in the local frame. A side may be infinite.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlanBox {
+    /// West and south side.
+    pub min: [f64; 2],
+    /// East and north side.
+    pub max: [f64; 2],
+}
+
+impl PlanBox {
+    /// The box that holds nothing; growing it by a point makes it that point.
+    pub const EMPTY: PlanBox = PlanBox { min: [f64::INFINITY; 2], max: [f64::NEG_INFINITY; 2] };
+
+    /// Grows the box to hold the point (x, y of `p`).
+    pub fn include(&mut self, p: DVec3) {
+        self.min = [self.min[0].min(p.x), self.min[1].min(p.y)];
+        self.max = [self.max[0].max(p.x), self.max[1].max(p.y)];
+    }
+
+    /// Grows the box to hold another one.
+    pub fn merge(&mut self, other: &PlanBox) {
+        self.min = [self.min[0].min(other.min[0]), self.min[1].min(other.min[1])];
+        self.max = [self.max[0].max(other.max[0]), self.max[1].max(other.max[1])];
+    }
+
+    /// The longer side, metres; 0 for the empty box.
+    pub fn width_m(&self) -> f64 {
+        (self.max[0] - self.min[0]).max(self.max[1] - self.min[1]).max(0.0)
+    }
+
+    /// Shortest distance from the point to a side, metres; negative outside.
+    pub fn margin_m(&self, p: DVec3) -> f64 {
+        (p.x - self.min[0]).min(self.max[0] - p.x).min(p.y - self.min[1]).min(self.max[1] - p.y)
+    }
+}
+
+/// A sum that does not depend on the order of its terms.
+///
+/// Terms are truncated to multiples of 2^-64 and added as integers, so that survey-wide means are the
+/// same bits whatever the tiling, the thread count or the order of the file. Terms must be finite and
+/// below 2^40 in magnitude; 2^20 times as many terms as fit any disk can be added.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct ExactSum(i128);
+
+impl ExactSum {
+    const SCALE: f64 = 18_446_744_073_709_551_616.0;
+
+    /// Adds one term.
+    pub fn add(&mut self, term: f64) {
+        self.0 += (term * Self::SCALE) as i128;
+    }
+
+    /// Adds another sum.
+    pub fn merge(&mut self, other: ExactSum) {
+        self.0 += other.0;
+    }
+
+    /// The sum, rounded to the nearest `f64`.
+    pub fn value(self) -> f64 {
+        self.0 as f64 / Self::SCALE
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_exact_sum_does_not_depend_on_order() {
+        let terms: Vec<f64> = (1..2000).map(|i| 1e-3 / f64::from(i) + f64::from(i % 7) * 1e5).collect();
+        let (mut up, mut down) = (ExactSum::default(), ExactSum::default());
+        terms.iter().for_each(|&t| up.add(t));
+        terms.iter().rev().for_each(|&t| down.add(t));
+        assert_eq!(up, down);
+        let plain: f64 = terms.iter().sum();
+        assert!((up.value() - plain).abs() < 1e-6, "{} against {plain}", up.value());
+    }
+}

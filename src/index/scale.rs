@@ -1,0 +1,26 @@
+//! The scale of a survey: every number that all tiles must share.
+
+use crate::geometry::DVec3;
+
+/// Survey-wide figures, from exact sums: the same bits whatever the tiling or the order of the file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scale {
+    /// Number of vertices, unused ones included.
+    pub vertices: u64,
+    /// Number of triangles, zero-area ones included.
+    pub triangles: u64,
+    /// Lowest corner of the vertices' box, local metres.
+    pub min: DVec3,
+    /// Highest corner of the vertices' box, local metres.
+    pub max: DVec3,
+    /// Summed triangle area, m².
+    pub surface_area_m2: f64,
+    /// Mean triangle area, m².
+    pub mean_triangle_area_m2: f64,
+    /// Mean length of the triangles' edges (an edge counts once per triangle), metres.
+    pub mean_edge_m: f64,
+    /// Mean distance from a vertex to the nearest triangle centroid, metres.
+    pub spacing_m: f64,
+    /// Triangles of zero area.
+    pub zero_area_triangles: u64,
+}

@@ -1,0 +1,5 @@
+//! Measuring: one whole segment becomes a [`Grain`].
+
+mod grain;
+
+pub use grain::{Grain, Polygon};
