@@ -13,7 +13,15 @@
 pub mod geometry;
 pub mod settings;
 
+pub mod curvature;
 pub mod index;
 pub mod measure;
 pub mod open;
+pub mod segment;
 pub mod stitch;
+pub mod tile;
+
+pub mod pipeline;
+pub mod progress;
+
+pub mod passes;

@@ -1,5 +1,46 @@
 //! Stitching: what the tiles published becomes one catalogue, the same whatever the tiles were.
+//!
+//! Grains need no joining: each was published whole, once, by the tile that owns it. They are put in the
+//! order of their anchors, numbered, and coloured. Oversize bodies, which no tile sees whole, are joined
+//! by the triangle ids on both sides of every core border they cross.
 
 mod catalogue;
+mod color;
+mod oversize;
 
 pub use catalogue::{Catalogue, NumberedGrain, Oversize, TileReport};
+
+use crate::measure::Grain;
+use crate::segment::OversizePiece;
+
+/// What one tile publishes.
+#[derive(Debug, Clone)]
+pub struct TileFinding {
+    /// The grains that its core owns.
+    pub grains: Vec<Grain>,
+    /// The parts of oversize bodies in its core.
+    pub oversize: Vec<OversizePiece>,
+    /// How it was worked.
+    pub report: TileReport,
+}
+
+/// Joins the findings of all tiles, in any order. `touch_steps` is the distance, in steps of the outline
+/// grid, within which two outlines touch.
+pub fn stitch(findings: Vec<TileFinding>, touch_steps: i64) -> (Catalogue, Vec<TileReport>) {
+    let (mut grains, mut pieces, mut reports) = (Vec::new(), Vec::new(), Vec::new());
+    for finding in findings {
+        grains.extend(finding.grains);
+        pieces.extend(finding.oversize);
+        reports.push(finding.report);
+    }
+    grains.sort_by_key(|g: &Grain| g.anchor);
+    reports.sort_by_key(|r| r.tile);
+    let colors = color::colors(&grains, touch_steps);
+    let grains = grains
+        .into_iter()
+        .zip(colors)
+        .zip(1..)
+        .map(|((grain, segment_color), grain_id)| NumberedGrain { grain_id, segment_color, grain })
+        .collect();
+    (Catalogue { grains, oversize: oversize::join(pieces) }, reports)
+}

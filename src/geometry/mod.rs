@@ -3,7 +3,10 @@
 //! All lengths are metres in the survey's local frame (see [`crate::open::Frame`]): x east, y north,
 //! z up, relative to an origin near the survey, so that `f64` keeps nanometres.
 
+mod hull;
+
 pub use glam::DVec3;
+pub use hull::{Hull, hull, sphericity};
 
 /// A rectangle in plan, metres in the local frame. A side may be infinite.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,6 +44,23 @@ impl PlanBox {
     }
 }
 
+/// Area of a triangle, m².
+pub fn triangle_area(corners: [DVec3; 3]) -> f64 {
+    0.5 * (corners[1] - corners[0]).cross(corners[2] - corners[0]).length()
+}
+
+/// Centroid of a triangle. The order of the additions is fixed, so that every tile gets the same bits.
+pub fn triangle_centroid(corners: [DVec3; 3]) -> DVec3 {
+    ((corners[0] + corners[1]) + corners[2]) / 3.0
+}
+
+/// Unit normal of a triangle by the right-hand rule; zero for a triangle of no area.
+pub fn triangle_normal(corners: [DVec3; 3]) -> DVec3 {
+    let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+    let length = normal.length();
+    if length > 0.0 { normal / length } else { DVec3::ZERO }
+}
+
 /// A sum that does not depend on the order of its terms.
 ///
 /// Terms are truncated to multiples of 2^-64 and added as integers, so that survey-wide means are the
@@ -50,6 +70,8 @@ impl PlanBox {
 pub struct ExactSum(i128);
 
 impl ExactSum {
+    /// The sum of nothing.
+    pub const ZERO: ExactSum = ExactSum(0);
     const SCALE: f64 = 18_446_744_073_709_551_616.0;
 
     /// Adds one term.

@@ -1,0 +1,169 @@
+//! The outline of a grain in plan: the union of its projected triangles, overhangs included.
+//!
+//! Every projected triangle is turned counter-clockwise, and edges that two of them run through in
+//! opposite directions cancel. What is left are closed chains around which the winding number counts the
+//! triangles above a point, so the union is where it is not 0: `i_overlay` needs only the rim and the
+//! silhouette of the grain, not its thousands of triangles.
+//!
+//! Points lie on the integer grid of [`crate::open::Frame::outline_position`]: a result that is valid
+//! there stays valid wherever an offset moves it.
+
+use super::grain::Polygon;
+use crate::geometry::DVec3;
+use crate::tile::TileMesh;
+use i_overlay::core::fill_rule::FillRule;
+use i_overlay::core::overlay::{IntOverlayOptions, Overlay, ShapeType};
+use i_overlay::core::overlay_rule::OverlayRule;
+use i_overlay::core::solver::Solver;
+use i_overlay::i_float::int::point::IntPoint;
+
+/// Outline of some triangles, and its area in m². `step_m` is the grid's step.
+pub fn outline(mesh: &TileMesh, triangles: &[u32], step_m: f64) -> (Vec<Polygon>, f64) {
+    let Some(&first) = triangles.first() else { return (Vec::new(), 0.0) };
+    let steps = |p: DVec3| [(p.x / step_m).round() as i64, (p.y / step_m).round() as i64];
+    let origin = steps(mesh.corners(first)[0]);
+    let place = |v: u32| {
+        let [x, y] = steps(mesh.positions[v as usize]);
+        IntPoint::new(clamp(x - origin[0]), clamp(y - origin[1]))
+    };
+    let mut overlay: Overlay<i32> = Overlay::new_custom(256, IntOverlayOptions::ogc(), Solver::default());
+    for chain in chains(mesh, triangles, &place) {
+        overlay.add_contour(&chain, ShapeType::Subject);
+    }
+    let shapes = overlay.overlay(OverlayRule::Subject, FillRule::NonZero);
+    let polygons: Vec<Polygon> = shapes
+        .into_iter()
+        .map(|shape| {
+            shape
+                .into_iter()
+                .map(|ring| {
+                    ring.into_iter().map(|p| [i64::from(p.x) + origin[0], i64::from(p.y) + origin[1]]).collect()
+                })
+                .collect()
+        })
+        .collect();
+    let twice: i128 = polygons.iter().flatten().map(|ring| twice_area(ring)).sum();
+    (polygons, twice as f64 / 2.0 * step_m * step_m)
+}
+
+/// A grain wider than 2 km would leave the grid: it is cut off there instead of wrapping round.
+fn clamp(x: i64) -> i32 {
+    x.clamp(-(1 << 30), 1 << 30) as i32
+}
+
+/// Twice the signed area of a ring, counter-clockwise positive, in square steps.
+fn twice_area(ring: &[[i64; 2]]) -> i128 {
+    let o = ring[0];
+    let next = ring.iter().skip(1).chain(ring.first());
+    ring.iter()
+        .zip(next)
+        .map(|(a, b)| {
+            i128::from(a[0] - o[0]) * i128::from(b[1] - o[1]) - i128::from(b[0] - o[0]) * i128::from(a[1] - o[1])
+        })
+        .sum()
+}
+
+/// Closed chains of the edges that do not cancel, each from its lowest vertex on.
+fn chains(mesh: &TileMesh, triangles: &[u32], place: &dyn Fn(u32) -> IntPoint<i32>) -> Vec<Vec<IntPoint<i32>>> {
+    let mut directed: Vec<(u32, u32, i32)> = Vec::with_capacity(triangles.len() * 3);
+    for &t in triangles {
+        let corners = mesh.triangles[t as usize];
+        let [a, b, c] = corners.map(place);
+        let (ab, ac) = ((b.x - a.x, b.y - a.y), (c.x - a.x, c.y - a.y));
+        let turn = i64::from(ab.0) * i64::from(ac.1) - i64::from(ab.1) * i64::from(ac.0);
+        if turn == 0 {
+            continue;
+        }
+        let [u, v, w] = if turn > 0 { corners } else { [corners[0], corners[2], corners[1]] };
+        for (from, to) in [(u, v), (v, w), (w, u)] {
+            directed.push(if from < to { (from, to, 1) } else { (to, from, -1) });
+        }
+    }
+    directed.sort_unstable();
+    let mut left: Vec<(u32, u32)> = Vec::new();
+    for run in directed.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)) {
+        let count: i32 = run.iter().map(|e| e.2).sum();
+        let edge = if count > 0 { (run[0].0, run[0].1) } else { (run[0].1, run[0].0) };
+        left.extend(std::iter::repeat_n(edge, count.unsigned_abs() as usize));
+    }
+    left.sort_unstable();
+    walk(&left).into_iter().map(|chain| chain.into_iter().map(place).collect()).collect()
+}
+
+/// Splits balanced directed edges (as many arrive at a vertex as leave it) into closed chains.
+fn walk(edges: &[(u32, u32)]) -> Vec<Vec<u32>> {
+    let mut used = vec![false; edges.len()];
+    let mut chains = Vec::new();
+    for begin in 0..edges.len() {
+        if used[begin] {
+            continue;
+        }
+        let mut chain = Vec::new();
+        let mut next = begin;
+        loop {
+            used[next] = true;
+            chain.push(edges[next].0);
+            let from = edges[next].1;
+            let first = edges.partition_point(|e| e.0 < from);
+            let Some(free) = (first..edges.len()).take_while(|&i| edges[i].0 == from).find(|&i| !used[i]) else {
+                break;
+            };
+            next = free;
+        }
+        chains.push(chain);
+    }
+    chains
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mesh(points: &[[f64; 3]], triangles: &[[u32; 3]]) -> TileMesh {
+        TileMesh {
+            positions: points.iter().map(|&p| DVec3::from_array(p)).collect(),
+            triangles: triangles.to_vec(),
+            ..TileMesh::default()
+        }
+    }
+
+    #[test]
+    fn inner_edges_vanish_and_the_area_is_that_of_the_square() {
+        let m = mesh(&[[0., 0., 0.], [1., 0., 1.], [1., 1., 0.], [0., 1., 2.]], &[[0, 1, 2], [0, 2, 3]]);
+        let (polygons, area) = outline(&m, &[0, 1], 1.0 / 1024.0);
+        assert_eq!((polygons.len(), polygons[0].len(), polygons[0][0].len()), (1, 1, 4));
+        assert!((area - 1.0).abs() < 1e-12, "{area}");
+    }
+
+    #[test]
+    fn an_overhang_counts_once_and_sticks_out() {
+        // A strip that runs east, folds back under itself and ends further east below.
+        let m = mesh(
+            &[
+                [0., 0., 2.],
+                [2., 0., 2.],
+                [2., 1., 2.],
+                [0., 1., 2.],
+                [1., 0., 1.],
+                [1., 1., 1.],
+                [4., 0., 0.],
+                [4., 1., 0.],
+            ],
+            &[[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 2], [4, 6, 7], [4, 7, 5]],
+        );
+        let (polygons, area) = outline(&m, &[0, 1, 2, 3, 4, 5], 1.0 / 1024.0);
+        assert_eq!(polygons.len(), 1);
+        assert!((area - 4.0).abs() < 1e-12, "{area}: {polygons:?}");
+    }
+
+    #[test]
+    fn a_ring_of_triangles_has_a_hole() {
+        let square = |r: f64| [[-r, -r, 0.], [r, -r, 0.], [r, r, 0.], [-r, r, 0.]];
+        let points: Vec<[f64; 3]> = square(2.0).into_iter().chain(square(1.0)).collect();
+        let triangles: Vec<[u32; 3]> =
+            (0..4).flat_map(|i| [[i, (i + 1) % 4, i + 4], [(i + 1) % 4, (i + 1) % 4 + 4, i + 4]]).collect();
+        let (polygons, area) = outline(&mesh(&points, &triangles), &[0, 1, 2, 3, 4, 5, 6, 7], 1.0 / 1024.0);
+        assert_eq!((polygons.len(), polygons[0].len()), (1, 2));
+        assert!((area - 12.0).abs() < 1e-12, "{area}");
+    }
+}

@@ -1,0 +1,54 @@
+//! What every later stage may ask of a survey, whatever its files are.
+
+use crate::geometry::DVec3;
+
+/// A triangulated surface: vertices and triangles by global number, in the order of the input.
+///
+/// The numbers are the identity of everything: neighbours tie-break by them, components are named by
+/// them, tiles are stitched by them.
+pub trait Surface: Sync {
+    /// Number of vertices.
+    fn vertices(&self) -> u64;
+    /// Number of triangles.
+    fn triangles(&self) -> u64;
+    /// Position of a vertex, local metres.
+    fn position(&self, vertex: u64) -> DVec3;
+    /// The three vertices of a triangle, counter-clockwise seen from outside.
+    fn triangle(&self, triangle: u64) -> [u64; 3];
+    /// Colour of a vertex, red, green, blue in 0 to 1, if the survey has colours.
+    fn color(&self, vertex: u64) -> Option<[f64; 3]>;
+
+    /// The three corners of a triangle, local metres.
+    fn corners(&self, triangle: u64) -> [DVec3; 3] {
+        self.triangle(triangle).map(|v| self.position(v))
+    }
+}
+
+/// A surface held in memory, in local metres.
+#[derive(Debug, Clone, Default)]
+pub struct MemorySurface {
+    /// Vertex positions, local metres.
+    pub positions: Vec<DVec3>,
+    /// Triangles, as numbers of vertices.
+    pub triangles: Vec<[u64; 3]>,
+    /// Colours of the vertices in 0 to 1; empty for none.
+    pub colors: Vec<[f64; 3]>,
+}
+
+impl Surface for MemorySurface {
+    fn vertices(&self) -> u64 {
+        self.positions.len() as u64
+    }
+    fn triangles(&self) -> u64 {
+        self.triangles.len() as u64
+    }
+    fn position(&self, vertex: u64) -> DVec3 {
+        self.positions[vertex as usize]
+    }
+    fn triangle(&self, triangle: u64) -> [u64; 3] {
+        self.triangles[triangle as usize]
+    }
+    fn color(&self, vertex: u64) -> Option<[f64; 3]> {
+        self.colors.get(vertex as usize).copied()
+    }
+}

@@ -1,0 +1,79 @@
+//! The mesh of a tile: core and halo, with what the cut left incomplete.
+
+use crate::geometry::{DVec3, triangle_area, triangle_centroid};
+use crate::index::{CellBlock, Index};
+use crate::open::Surface;
+
+/// Bytes that one loaded triangle takes at the height of segmentation: counted from the arrays of
+/// [`TileMesh`], its edges, labels and components, with a tenth for growth.
+pub const BYTES_PER_TRIANGLE: u64 = 240;
+
+/// Part of the survey: all triangles whose centroid lies in a block of cells, with their vertices.
+///
+/// Local numbers ascend with global ids, so that "lowest local number" and "lowest global id" agree.
+#[derive(Debug, Clone, Default)]
+pub struct TileMesh {
+    /// Global ids of the vertices, ascending.
+    pub vertex_ids: Vec<u64>,
+    /// Their positions, local metres.
+    pub positions: Vec<DVec3>,
+    /// Whether every triangle around the vertex was loaded.
+    pub complete: Vec<bool>,
+    /// Global ids of the triangles, ascending.
+    pub triangle_ids: Vec<u64>,
+    /// Their corners, as local vertex numbers.
+    pub triangles: Vec<[u32; 3]>,
+    /// Their areas, m².
+    pub areas_m2: Vec<f64>,
+    /// Whether the tile's core owns the triangle.
+    pub in_core: Vec<bool>,
+}
+
+impl TileMesh {
+    /// Loads a block of cells; `core` says what of it is owned.
+    pub fn load(surface: &dyn Surface, index: &Index, core: &CellBlock, block: &CellBlock) -> TileMesh {
+        let triangle_ids = index.triangles.in_block(&index.grid, block);
+        let global: Vec<[u64; 3]> = triangle_ids.iter().map(|&t| surface.triangle(t)).collect();
+        let mut vertex_ids: Vec<u64> = global.iter().flatten().copied().collect();
+        vertex_ids.sort_unstable();
+        vertex_ids.dedup();
+        let positions: Vec<DVec3> = vertex_ids.iter().map(|&v| surface.position(v)).collect();
+        let triangles: Vec<[u32; 3]> = global
+            .iter()
+            .map(|corners| corners.map(|v| vertex_ids.partition_point(|&other| other < v) as u32))
+            .collect();
+        let mut valence = vec![0u32; vertex_ids.len()];
+        for v in triangles.iter().flatten() {
+            valence[*v as usize] += 1;
+        }
+        let complete = vertex_ids.iter().zip(&valence).map(|(&v, &n)| index.valence[v as usize] == n).collect();
+        let corners = |t: &[u32; 3]| t.map(|v| positions[v as usize]);
+        let areas_m2 = triangles.iter().map(|t| triangle_area(corners(t))).collect();
+        let in_core =
+            triangles.iter().map(|t| core.contains(index.grid.cell_of(triangle_centroid(corners(t))))).collect();
+        TileMesh { vertex_ids, positions, complete, triangle_ids, triangles, areas_m2, in_core }
+    }
+
+    /// The corners of a triangle, local metres.
+    pub fn corners(&self, triangle: u32) -> [DVec3; 3] {
+        self.triangles[triangle as usize].map(|v| self.positions[v as usize])
+    }
+
+    /// Local numbers of the vertices of some triangles, ascending, each once.
+    pub fn vertices_of(&self, triangles: &[u32]) -> Vec<u32> {
+        let mut vertices: Vec<u32> = triangles.iter().flat_map(|&t| self.triangles[t as usize]).collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        vertices
+    }
+
+    /// Positions of the vertices of some triangles, by ascending vertex id, each once; local metres.
+    pub fn points_of(&self, triangles: &[u32]) -> Vec<DVec3> {
+        self.vertices_of(triangles).into_iter().map(|v| self.positions[v as usize]).collect()
+    }
+
+    /// Bytes that a tile of this many triangles takes while it is worked on.
+    pub fn footprint_bytes(triangles: u64) -> u64 {
+        triangles * BYTES_PER_TRIANGLE
+    }
+}

@@ -1,0 +1,16 @@
+//! What several test binaries share: where the data lies, and how the authors' results are read.
+#![allow(dead_code, unreachable_pub, missing_docs, clippy::unwrap_used)]
+
+use std::path::PathBuf;
+
+/// The folder of shared test data, or nothing (with a printed reason) where it is absent.
+pub fn data(relative: &str) -> Option<PathBuf> {
+    let root = std::env::var_os("GRAVELOMETER_DATA")
+        .map_or_else(|| PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data")), PathBuf::from);
+    let path = root.join(relative);
+    if path.exists() {
+        return Some(path);
+    }
+    println!("skipped: {} is not there (set GRAVELOMETER_DATA to the folder of shared data)", path.display());
+    None
+}
