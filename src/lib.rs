@@ -14,6 +14,7 @@ pub mod geometry;
 pub mod settings;
 
 pub mod index;
+pub mod inspect;
 pub mod measure;
 pub mod open;
 pub mod stitch;

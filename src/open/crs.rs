@@ -52,8 +52,8 @@ impl GeoReference {
         if !path.exists() {
             return Err(OpenError::CrsForm { text: text.to_owned() });
         }
-        let content = std::fs::read_to_string(path)
-            .map_err(|source| OpenError::CrsFile { path: text.to_owned(), source })?;
+        let content =
+            std::fs::read_to_string(path).map_err(|source| OpenError::CrsFile { path: text.to_owned(), source })?;
         match spatial_ref(text, content.trim())? {
             Some(system) => check(text, &system).map(Some),
             None => Err(OpenError::CrsUnknown { text: text.to_owned(), message: "the file holds no WKT".to_owned() }),
@@ -112,8 +112,7 @@ fn check(text: &str, system: &SpatialRef) -> Result<GeoReference, OpenError> {
     {
         return Err(OpenError::CrsUnits { text, name, plan_m, height_m });
     }
-    let wkt =
-        system.to_wkt().map_err(|e| OpenError::CrsUnknown { text: text.clone(), message: e.to_string() })?;
+    let wkt = system.to_wkt().map_err(|e| OpenError::CrsUnknown { text: text.clone(), message: e.to_string() })?;
     Ok(GeoReference { crs: Crs { wkt, name, authority: authority(system) }, metres_per_unit: plan_m })
 }
 

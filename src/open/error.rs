@@ -37,7 +37,9 @@ pub enum OpenError {
     )]
     HeaderUnended { path: String, searched: u64 },
     /// A header line that is not PLY.
-    #[error("{path}: header line {line} cannot be understood: `{text}` ({reason})\nhelp: export the mesh again as PLY 1.0")]
+    #[error(
+        "{path}: header line {line} cannot be understood: `{text}` ({reason})\nhelp: export the mesh again as PLY 1.0"
+    )]
     HeaderLine { path: String, line: u64, text: String, reason: String },
     /// An encoding that is not read.
     #[error(
@@ -51,7 +53,9 @@ pub enum OpenError {
     )]
     RepeatedElement { path: String, element: String },
     /// There is no `vertex` element.
-    #[error("{path}: the header declares no element `vertex` (it declares: {found})\nhelp: export a triangle mesh as PLY")]
+    #[error(
+        "{path}: the header declares no element `vertex` (it declares: {found})\nhelp: export a triangle mesh as PLY"
+    )]
     NoVertexElement { path: String, found: String },
     /// The file has no vertices.
     #[error("{path}: has 0 vertices\nhelp: the mesh is empty; check the export")]
@@ -141,12 +145,12 @@ pub enum OpenError {
     FloatStep { path: String, largest: f64, step_m: f64, edge_m: f64 },
 
     /// A CRS that is neither code, text nor file.
-    #[error(
-        "--crs {text}: is neither EPSG:n, nor WKT, nor a file\nhelp: give a code such as EPSG:2193 or a .prj file"
-    )]
+    #[error("--crs {text}: is neither EPSG:n, nor WKT, nor a file\nhelp: give a code such as EPSG:2193 or a .prj file")]
     CrsForm { text: String },
     /// A CRS file that cannot be read.
-    #[error("--crs {path}: cannot be read: {source}\nhelp: give a code such as EPSG:2193, or a text file that holds WKT")]
+    #[error(
+        "--crs {path}: cannot be read: {source}\nhelp: give a code such as EPSG:2193, or a text file that holds WKT"
+    )]
     CrsFile { path: String, source: std::io::Error },
     /// A CRS that GDAL does not know.
     #[error("--crs {text}: GDAL cannot make a coordinate system of it: {message}\nhelp: check the code or the WKT")]

@@ -1,6 +1,7 @@
 //! One file of a survey, as others see it.
 
 use super::ply::PlyMesh;
+use super::precision::coarsest_step;
 use super::scalar::Scalar;
 use super::vertices::ScalarProperty;
 use serde::Serialize;
@@ -127,6 +128,12 @@ impl SurveyFile {
     /// Lowest and highest coordinates, input units.
     pub fn input_bounds(&self) -> ([f64; 3], [f64; 3]) {
         self.mesh.bounds
+    }
+
+    /// Coarsest distance between neighbouring values of the file's coordinates at their largest, input
+    /// units; `None` if all are whole numbers.
+    pub fn coordinate_step(&self) -> Option<f64> {
+        coarsest_step(self.axis_types(), self.input_bounds()).map(|(step, _)| step)
     }
 
     /// The numbers of a vertex record: those before its first list, if it has lists.
