@@ -113,16 +113,7 @@ fn check(text: &str, system: &SpatialRef) -> Result<GeoReference, OpenError> {
         return Err(OpenError::CrsUnits { text, name, plan_m, height_m });
     }
     let wkt = system.to_wkt().map_err(|e| OpenError::CrsUnknown { text: text.clone(), message: e.to_string() })?;
-    Ok(GeoReference { crs: Crs { wkt, name, authority: authority(system) }, metres_per_unit: plan_m })
-}
-
-/// The system's code; ESRI's `.prj` files carry none, but many can be recognised.
-fn authority(system: &SpatialRef) -> Option<String> {
-    system.authority().ok().or_else(|| {
-        let mut guessed = system.clone();
-        guessed.auto_identify_epsg().ok()?;
-        guessed.authority().ok()
-    })
+    Ok(GeoReference { crs: Crs { wkt, name, authority: system.authority().ok() }, metres_per_unit: plan_m })
 }
 
 /// Unit of a compound system's heights, metres.

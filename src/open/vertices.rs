@@ -153,10 +153,10 @@ impl Vertices {
     #[inline]
     fn look(&self, bytes: &[u8], mut bounds: VertexBounds, vertex: u64) -> VertexBounds {
         let p = self.position(bytes, vertex);
-        for axis in 0..3 {
-            bounds.min[axis] = bounds.min[axis].min(p[axis]);
-            bounds.max[axis] = bounds.max[axis].max(p[axis]);
-            if !p[axis].is_finite() && bounds.not_finite.is_none() {
+        for (axis, &value) in p.iter().enumerate() {
+            bounds.min[axis] = bounds.min[axis].min(value);
+            bounds.max[axis] = bounds.max[axis].max(value);
+            if !value.is_finite() && bounds.not_finite.is_none() {
                 bounds.not_finite = Some((vertex, axis));
             }
         }

@@ -1,8 +1,10 @@
 //! The same surface under many layouts.
 
-use crate::ply_bytes::{Element, PLACES, TRIANGLES, axis, corner_lists, faces, file, file_with, vertices};
+use crate::ply_bytes::{Element, PLACES, TRIANGLES, axis, corner_lists, faces, file, file_with, header, vertices};
 use crate::{assert_contains, open_bytes};
 use gravelometer::open::{OpenError, Reach, Scalar, Warning};
+use gravelometer::settings::InputSettings;
+use std::os::unix::fs::FileExt;
 
 #[track_caller]
 fn assert_is_the_patch(reach: &Reach) {
@@ -264,4 +266,22 @@ fn floats_too_coarse_for_the_surface_are_refused_and_doubles_are_not() {
     assert!(matches!(error, OpenError::FloatStep { .. }), "{error}");
     assert_contains(&error.to_string(), &["reach.ply", "5.000e-1 m", "5250000", "--offset"]);
     opened(&file(&[&build("double"), &faces()]));
+}
+
+#[test]
+fn records_beyond_four_gibibytes_are_reached() {
+    // The file is sparse: five thousand million bytes of an unknown element, of which none is written or read.
+    const PADDING: u64 = 5_000_000_000;
+    let mut padding = Element::new("padding").numbers("uchar nothing", []);
+    padding.declared = Some(PADDING);
+    let (vertices, faces) = (vertices(), faces());
+    let head = header(&[&padding, &vertices, &faces], "\n");
+    let payload = file(&[&vertices, &faces])[header(&[&vertices, &faces], "\n").len()..].to_vec();
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = directory.path().join("reach.ply");
+    let out = std::fs::File::create(&path).expect("create");
+    out.write_all_at(head.as_bytes(), 0).expect("write");
+    out.write_all_at(&payload, head.len() as u64 + PADDING).expect("write");
+    let (reach, _) = Reach::open(&[path], &InputSettings::default(), &|_, _| {}).unwrap_or_else(|e| panic!("{e}"));
+    assert_is_the_patch(&reach);
 }

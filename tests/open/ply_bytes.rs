@@ -2,7 +2,7 @@
 
 /// A value of a record.
 #[derive(Debug, Clone)]
-pub enum Value {
+pub(crate) enum Value {
     One(f64),
     Many(Vec<f64>),
 }
@@ -15,29 +15,29 @@ struct Column {
 
 /// An element: columns of values under property declarations.
 #[derive(Debug, Clone)]
-pub struct Element {
+pub(crate) struct Element {
     name: String,
     /// What the header says, if not the truth.
-    pub declared: Option<u64>,
+    pub(crate) declared: Option<u64>,
     columns: Vec<Column>,
 }
 
 impl Element {
-    pub fn new(name: &str) -> Element {
+    pub(crate) fn new(name: &str) -> Element {
         Element { name: name.into(), declared: None, columns: Vec::new() }
     }
 
     /// Adds a property, declared as in a header (`float x`, `list uchar int vertex_indices`).
-    pub fn with(mut self, declaration: &str, values: impl IntoIterator<Item = Value>) -> Element {
+    pub(crate) fn with(mut self, declaration: &str, values: impl IntoIterator<Item = Value>) -> Element {
         self.columns.push(Column { declaration: declaration.into(), values: values.into_iter().collect() });
         self
     }
 
-    pub fn numbers(self, declaration: &str, values: impl IntoIterator<Item = f64>) -> Element {
+    pub(crate) fn numbers(self, declaration: &str, values: impl IntoIterator<Item = f64>) -> Element {
         self.with(declaration, values.into_iter().map(Value::One))
     }
 
-    pub fn lists(self, declaration: &str, values: impl IntoIterator<Item = Vec<f64>>) -> Element {
+    pub(crate) fn lists(self, declaration: &str, values: impl IntoIterator<Item = Vec<f64>>) -> Element {
         self.with(declaration, values.into_iter().map(Value::Many))
     }
 
@@ -81,44 +81,44 @@ fn push(out: &mut Vec<u8>, kind: &str, value: f64) {
 }
 
 /// The header of a little-endian file with these elements.
-pub fn header(elements: &[&Element], newline: &str) -> String {
+pub(crate) fn header(elements: &[&Element], newline: &str) -> String {
     let elements: String = elements.iter().map(|e| e.header(newline)).collect();
     format!("ply{newline}format binary_little_endian 1.0{newline}comment a test{newline}{elements}end_header{newline}")
 }
 
 /// A whole file.
-pub fn file(elements: &[&Element]) -> Vec<u8> {
+pub(crate) fn file(elements: &[&Element]) -> Vec<u8> {
     file_with(elements, "\n")
 }
 
 /// A whole file with these line ends.
-pub fn file_with(elements: &[&Element], newline: &str) -> Vec<u8> {
+pub(crate) fn file_with(elements: &[&Element], newline: &str) -> Vec<u8> {
     let mut bytes = header(elements, newline).into_bytes();
     elements.iter().for_each(|e| e.payload(&mut bytes));
     bytes
 }
 
 /// A tetrahedron-like patch: five vertices over a square metre, four triangles about the middle.
-pub const PLACES: [[f64; 3]; 5] =
+pub(crate) const PLACES: [[f64; 3]; 5] =
     [[1.0, 2.0, 0.5], [2.0, 2.0, 0.25], [2.0, 3.0, 0.0], [1.0, 3.0, -0.25], [1.5, 2.5, 1.0]];
-pub const TRIANGLES: [[u64; 3]; 4] = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]];
+pub(crate) const TRIANGLES: [[u64; 3]; 4] = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]];
 
 /// The column of one coordinate.
-pub fn axis(i: usize) -> impl Iterator<Item = f64> {
+pub(crate) fn axis(i: usize) -> impl Iterator<Item = f64> {
     PLACES.into_iter().map(move |p| p[i])
 }
 
 /// The corner lists of the triangles.
-pub fn corner_lists() -> impl Iterator<Item = Vec<f64>> {
+pub(crate) fn corner_lists() -> impl Iterator<Item = Vec<f64>> {
     TRIANGLES.into_iter().map(|t| t.iter().map(|&v| v as f64).collect())
 }
 
 /// The vertices as doubles.
-pub fn vertices() -> Element {
+pub(crate) fn vertices() -> Element {
     Element::new("vertex").numbers("double x", axis(0)).numbers("double y", axis(1)).numbers("double z", axis(2))
 }
 
 /// The faces as most software writes them.
-pub fn faces() -> Element {
+pub(crate) fn faces() -> Element {
     Element::new("face").lists("list uchar int vertex_indices", corner_lists())
 }
