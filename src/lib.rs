@@ -10,18 +10,28 @@
 //! [`run`] is the page that shows all of it. A stage may use the stages above it, never those below;
 //! [`pipeline`] schedules tiles and knows no geometry.
 
+// What every stage may use.
 pub mod geometry;
+pub mod progress;
 pub mod settings;
 
-pub mod curvature;
-pub mod index;
-pub mod measure;
+// The river. Blank lines keep the order.
 pub mod open;
-pub mod segment;
-pub mod stitch;
+
+pub mod index;
+
 pub mod tile;
 
-pub mod pipeline;
-pub mod progress;
+pub mod curvature;
 
+pub mod segment;
+
+pub mod measure;
+
+pub mod stitch;
+
+// What schedules it, and what stands beside it.
+pub mod pipeline;
+
+pub mod inspect;
 pub mod passes;

@@ -1,7 +1,28 @@
 //! Opening a survey: files become arrays in one frame. Knows formats and georeferencing, nothing else.
 
+mod crs;
+mod error;
+mod faces;
 mod frame;
+mod mapped;
+mod ply;
+mod ply_header;
+mod precision;
+mod progress;
+mod reach;
+mod records;
+mod scalar;
 mod surface;
+mod survey_file;
+mod vertices;
+mod warning;
 
+pub use crs::{GeoReference, silence_gdal};
+pub use error::OpenError;
 pub use frame::{Crs, Frame};
+pub use reach::Reach;
+pub use scalar::Scalar;
 pub use surface::{MemorySurface, Surface};
+pub use survey_file::{Fingerprint, SurveyFile};
+pub use vertices::ScalarProperty;
+pub use warning::Warning;

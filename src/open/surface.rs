@@ -1,5 +1,6 @@
 //! What every later stage may ask of a survey, whatever its files are.
 
+use super::Reach;
 use crate::geometry::DVec3;
 
 /// A triangulated surface: vertices and triangles by global number, in the order of the input.
@@ -21,6 +22,24 @@ pub trait Surface: Sync {
     /// The three corners of a triangle, local metres.
     fn corners(&self, triangle: u64) -> [DVec3; 3] {
         self.triangle(triangle).map(|v| self.position(v))
+    }
+}
+
+impl Surface for Reach {
+    fn vertices(&self) -> u64 {
+        self.vertices()
+    }
+    fn triangles(&self) -> u64 {
+        self.triangles()
+    }
+    fn position(&self, vertex: u64) -> DVec3 {
+        self.position(vertex)
+    }
+    fn triangle(&self, triangle: u64) -> [u64; 3] {
+        self.triangle(triangle)
+    }
+    fn color(&self, vertex: u64) -> Option<[f64; 3]> {
+        self.color(vertex)
     }
 }
 

@@ -67,18 +67,3 @@ impl Drop for Reservation {
         self.shared.freed.notify_all();
     }
 }
-
-/// Memory that this process may use, bytes: the machine's, or its control group's limit where lower.
-/// Nothing where the system does not tell.
-pub fn machine_memory_bytes() -> Option<u64> {
-    let number = |text: String| text.trim().parse::<u64>().ok();
-    let group = ["/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"]
-        .into_iter()
-        .filter_map(|path| std::fs::read_to_string(path).ok().and_then(number))
-        .min();
-    let machine = std::fs::read_to_string("/proc/meminfo").ok().and_then(|text| {
-        let line = text.lines().find_map(|l| l.strip_prefix("MemTotal:"))?;
-        number(line.trim().trim_end_matches("kB").to_owned()).map(|kib| kib * 1024)
-    });
-    machine.into_iter().chain(group).min()
-}

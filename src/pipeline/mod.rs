@@ -10,9 +10,11 @@
 
 mod budget;
 mod control;
+mod machine;
 
-pub use budget::{Budget, Reservation, machine_memory_bytes};
+pub use budget::{Budget, Reservation};
 pub use control::{Control, Interrupted};
+pub use machine::memory_there_bytes;
 
 use crossbeam_channel::{Receiver, Sender, bounded};
 use std::collections::BTreeMap;

@@ -1,0 +1,113 @@
+//! An inspection for people.
+
+use super::{Contents, FileFigures, Inspection, SurfaceFigures, SurveyFigures};
+use std::fmt::{self, Display, Formatter};
+
+impl Display for Inspection {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        for file in &self.files {
+            write_file(f, file)?;
+        }
+        write_survey(f, &self.survey, self.files.len())?;
+        for warning in &self.warnings {
+            writeln!(f, "\nwarning: {warning}")?;
+        }
+        Ok(())
+    }
+}
+
+fn row(f: &mut Formatter<'_>, name: &str, value: impl Display) -> fmt::Result {
+    writeln!(f, "  {name:<20} {value}")
+}
+
+fn write_file(f: &mut Formatter<'_>, file: &FileFigures) -> fmt::Result {
+    writeln!(f, "{}", file.path)?;
+    row(f, "format", format!("{}, {}", file.format, bytes(file.fingerprint.bytes)))?;
+    let step = file.coordinate_step_m.map_or("whole numbers".to_owned(), |s| format!("steps of at most {}", length(s)));
+    let [x, y, z] = file.coordinate_types;
+    let types = if x == y && y == z { x.to_owned() } else { format!("{x}, {y}, {z}") };
+    row(f, "coordinates", format!("{types}, {step}"))?;
+    row(f, "colours", file.color_type.unwrap_or("none"))?;
+    write_contents(f, &file.contents)?;
+    write_surface(f, &file.surface)?;
+    writeln!(f)
+}
+
+fn write_survey(f: &mut Formatter<'_>, survey: &SurveyFigures, files: usize) -> fmt::Result {
+    writeln!(f, "survey ({files} {})", if files == 1 { "file" } else { "files" })?;
+    let crs = match (&survey.crs_name, &survey.crs_code) {
+        (Some(name), Some(code)) => format!("{name} ({code})"),
+        (Some(name), None) => name.clone(),
+        _ => "none".to_owned(),
+    };
+    row(f, "CRS", crs)?;
+    row(f, "input unit", format!("{} m", survey.metres_per_input_unit))?;
+    row(f, "map unit", format!("{} m", survey.metres_per_map_unit))?;
+    if survey.offset_map != [0.0; 3] {
+        let [e, n, u] = survey.offset_map;
+        row(f, "offset", format!("{e}, {n}, {u} map units"))?;
+    }
+    if files != 1 {
+        row(f, "colours", if survey.has_colors { "yes" } else { "none" })?;
+        write_contents(f, &survey.contents)?;
+        write_surface(f, &survey.surface)?;
+    }
+    let s = &survey.suggestion;
+    let smallest = format!("{} ({})", area(s.smallest_grain_area_m2), length(s.smallest_grain_diameter_m));
+    row(f, "smallest grain", format!("{smallest} across: 50 mean triangles"))?;
+    let coarse = if s.coarse { " (coarser than 30 mm: boulders only)" } else { "" };
+    row(f, "preset", format!("configs/{}.toml{coarse}", s.preset.name()))?;
+    let limits = format!("--min-grain-area {:e} --max-grain {}", s.min_grain_area_m2, s.max_grain_m);
+    row(f, "suggested limits", limits)?;
+    let m = &survey.memory;
+    let verdict = match (m.there_bytes, m.untiled_fits) {
+        (Some(there), Some(true)) => format!("fits in the {} that are there", bytes(there)),
+        (Some(there), _) => format!("does not fit in the {} that are there: run in tiles", bytes(there)),
+        _ => "what is there is not known".to_owned(),
+    };
+    row(f, "memory, untiled", format!("about {}; {verdict}", bytes(m.untiled_bytes)))
+}
+
+fn write_contents(f: &mut Formatter<'_>, c: &Contents) -> fmt::Result {
+    row(f, "vertices", c.vertices)?;
+    row(f, "faces", c.faces)?;
+    row(f, "triangles", c.triangles)?;
+    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+        let (min, max) = (c.min_input[axis], c.max_input[axis]);
+        let metres = format!("{:.4} to {:.4} m", c.min_m[axis], c.max_m[axis]);
+        row(f, name, format!("{min} to {max} input units, {metres}"))?;
+    }
+    let [x, y, z] = c.extent_m;
+    row(f, "extent", format!("{x:.3} x {y:.3} x {z:.3} m"))
+}
+
+fn write_surface(f: &mut Formatter<'_>, s: &SurfaceFigures) -> fmt::Result {
+    row(f, "mean edge", length(s.mean_edge_m))?;
+    row(f, "mean triangle", area(s.mean_triangle_area_m2))?;
+    row(f, "surface", area(s.surface_area_m2))?;
+    row(f, "density", s.triangles_per_m2.map_or("none".to_owned(), |d| format!("{d:.0} triangles per m²")))?;
+    row(f, "zero-area triangles", s.zero_area_triangles)
+}
+
+fn length(metres: f64) -> String {
+    match metres {
+        m if m >= 1.0 => format!("{m:.3} m"),
+        m if m >= 1e-4 => format!("{:.2} mm", m * 1e3),
+        m => format!("{m:.1e} m"),
+    }
+}
+
+fn area(m2: f64) -> String {
+    if m2 >= 0.01 { format!("{m2:.3} m²") } else { format!("{:.3} mm²", m2 * 1e6) }
+}
+
+fn bytes(bytes: u64) -> String {
+    let mut value = bytes as f64;
+    for unit in ["B", "KiB", "MiB", "GiB"] {
+        if value < 1024.0 {
+            return if unit == "B" { format!("{bytes} B") } else { format!("{value:.1} {unit}") };
+        }
+        value /= 1024.0;
+    }
+    format!("{value:.1} TiB")
+}

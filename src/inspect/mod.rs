@@ -1,0 +1,222 @@
+//! A first look at a survey: what is in the files, what they can show, and what a run would take.
+
+mod display;
+mod memory;
+mod suggestion;
+
+use crate::geometry::{DVec3, ExactSum};
+use crate::open::{Fingerprint, Frame, OpenError, Reach, Scalar, SurveyFile};
+use crate::pipeline::memory_there_bytes;
+use crate::settings::InputSettings;
+use rayon::prelude::*;
+use serde::Serialize;
+use std::path::PathBuf;
+
+pub use memory::{Memory, STATE_BYTES_PER_TRIANGLE};
+pub use suggestion::{Preset, Suggestion};
+
+/// What a survey holds, whole and file by file.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Inspection {
+    /// All files together.
+    pub survey: SurveyFigures,
+    /// Each file, in the order given.
+    pub files: Vec<FileFigures>,
+    /// What is odd about them, each with a remedy.
+    pub warnings: Vec<String>,
+}
+
+/// All files together.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SurveyFigures {
+    /// Counts and coordinates.
+    pub contents: Contents,
+    /// Name of the CRS.
+    pub crs_name: Option<String>,
+    /// Code of the CRS, such as `EPSG:2193`.
+    pub crs_code: Option<String>,
+    /// Metres in one unit of the input.
+    pub metres_per_input_unit: f64,
+    /// Metres in one unit of the map.
+    pub metres_per_map_unit: f64,
+    /// Added to reach the map, map units.
+    pub offset_map: [f64; 3],
+    /// Whether every vertex has a colour.
+    pub has_colors: bool,
+    /// What the surface is made of.
+    pub surface: SurfaceFigures,
+    /// What the survey can show, and settings for it.
+    pub suggestion: Suggestion,
+    /// What an untiled run would take.
+    pub memory: Memory,
+}
+
+/// One file.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FileFigures {
+    /// The path as given.
+    pub path: String,
+    /// Format and encoding.
+    pub format: String,
+    /// Length and hash.
+    pub fingerprint: Fingerprint,
+    /// Types of x, y, z.
+    pub coordinate_types: [&'static str; 3],
+    /// Coarsest distance between neighbouring values of the file's coordinates at their largest, metres;
+    /// none for whole numbers.
+    pub coordinate_step_m: Option<f64>,
+    /// Type of the colours; none without colours.
+    pub color_type: Option<&'static str>,
+    /// The header's comments.
+    pub comments: Vec<String>,
+    /// Counts and coordinates.
+    pub contents: Contents,
+    /// What the surface is made of.
+    pub surface: SurfaceFigures,
+}
+
+/// Counts and coordinates.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Contents {
+    /// Vertices, unused ones included.
+    pub vertices: u64,
+    /// Faces as the file has them.
+    pub faces: u64,
+    /// Triangles into which they are cut.
+    pub triangles: u64,
+    /// Lowest coordinates, input units.
+    pub min_input: [f64; 3],
+    /// Highest coordinates, input units.
+    pub max_input: [f64; 3],
+    /// Lowest coordinates, metres.
+    pub min_m: [f64; 3],
+    /// Highest coordinates, metres.
+    pub max_m: [f64; 3],
+    /// Extent along x, y, z, metres.
+    pub extent_m: [f64; 3],
+}
+
+/// What a surface is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SurfaceFigures {
+    /// Mean length of the triangles' edges (an edge counts once per triangle), metres.
+    pub mean_edge_m: f64,
+    /// Mean triangle area, m².
+    pub mean_triangle_area_m2: f64,
+    /// Summed triangle area, m².
+    pub surface_area_m2: f64,
+    /// Triangles per m² of surface; none for a surface of no area.
+    pub triangles_per_m2: Option<f64>,
+    /// Triangles of zero area.
+    pub zero_area_triangles: u64,
+}
+
+/// Opens a survey and looks at every triangle.
+///
+/// # Errors
+/// Those of [`Reach::open`].
+pub fn inspect(paths: &[PathBuf], input: &InputSettings) -> Result<Inspection, OpenError> {
+    let (reach, warnings) = Reach::open(paths, input, &|_, _| {})?;
+    let sums: Vec<Sums> = reach.files().iter().map(|f| Sums::of(&reach, f)).collect();
+    let frame = reach.frame();
+    let files = reach.files().iter().zip(&sums).map(|(f, s)| file_figures(f, s, frame)).collect();
+    let surface = sums.iter().fold(Sums::default(), |a, &b| a.merge(b)).figures(reach.triangles());
+    let counts = [reach.vertices(), reach.faces(), reach.triangles()];
+    let survey = SurveyFigures {
+        contents: Contents::new(counts, reach.input_bounds(), frame),
+        crs_name: frame.crs.as_ref().map(|c| c.name.clone()),
+        crs_code: frame.crs.as_ref().and_then(|c| c.authority.clone()),
+        metres_per_input_unit: frame.metres_per_input_unit,
+        metres_per_map_unit: frame.metres_per_map_unit,
+        offset_map: frame.offset_map,
+        has_colors: reach.has_colors(),
+        surface,
+        suggestion: Suggestion::new(&surface, reach.has_colors()),
+        memory: Memory::untiled(reach.triangles(), memory_there_bytes()),
+    };
+    Ok(Inspection { survey, files, warnings: warnings.iter().map(ToString::to_string).collect() })
+}
+
+fn file_figures(file: &SurveyFile, sums: &Sums, frame: &Frame) -> FileFigures {
+    let counts = [file.vertices(), file.faces(), file.triangles()];
+    FileFigures {
+        path: file.path().display().to_string(),
+        format: file.format(),
+        fingerprint: file.fingerprint(),
+        coordinate_types: file.axis_types().map(Scalar::ply_name),
+        coordinate_step_m: file.coordinate_step().map(|step| step * frame.metres_per_input_unit),
+        color_type: file.color_type().map(Scalar::ply_name),
+        comments: file.comments().to_vec(),
+        contents: Contents::new(counts, file.input_bounds(), frame),
+        surface: sums.figures(file.triangles()),
+    }
+}
+
+impl Contents {
+    fn new(counts: [u64; 3], bounds: ([f64; 3], [f64; 3]), frame: &Frame) -> Contents {
+        let (min, max) = bounds;
+        let metres = frame.metres_per_input_unit;
+        Contents {
+            vertices: counts[0],
+            faces: counts[1],
+            triangles: counts[2],
+            min_input: min,
+            max_input: max,
+            min_m: min.map(|v| v * metres),
+            max_m: max.map(|v| v * metres),
+            extent_m: std::array::from_fn(|i| (max[i] - min[i]) * metres),
+        }
+    }
+}
+
+/// Exact sums over triangles: the same whatever the order.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    edge_m: ExactSum,
+    area_m2: ExactSum,
+    zero_area: u64,
+}
+
+/// Triangles per parallel task.
+const CHUNK: u64 = 1 << 16;
+
+impl Sums {
+    fn of(reach: &Reach, file: &SurveyFile) -> Sums {
+        (0..file.triangles().div_ceil(CHUNK))
+            .into_par_iter()
+            .map(|chunk| {
+                let mut sums = Sums::default();
+                for triangle in chunk * CHUNK..((chunk + 1) * CHUNK).min(file.triangles()) {
+                    let corners = reach.triangle(file.first_triangle() + triangle);
+                    sums.add(corners.map(|v| reach.position(v)));
+                }
+                sums
+            })
+            .reduce(Sums::default, Sums::merge)
+    }
+
+    fn add(&mut self, [a, b, c]: [DVec3; 3]) {
+        let area_m2 = (b - a).cross(c - a).length() / 2.0;
+        self.area_m2.add(area_m2);
+        self.edge_m.add(a.distance(b) + b.distance(c) + c.distance(a));
+        self.zero_area += u64::from(area_m2 == 0.0);
+    }
+
+    fn merge(mut self, other: Sums) -> Sums {
+        self.edge_m.merge(other.edge_m);
+        self.area_m2.merge(other.area_m2);
+        self.zero_area += other.zero_area;
+        self
+    }
+
+    fn figures(&self, triangles: u64) -> SurfaceFigures {
+        let (count, area) = (triangles as f64, self.area_m2.value());
+        SurfaceFigures {
+            mean_edge_m: self.edge_m.value() / (3.0 * count),
+            mean_triangle_area_m2: area / count,
+            surface_area_m2: area,
+            triangles_per_m2: (area > 0.0).then(|| count / area),
+            zero_area_triangles: self.zero_area,
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! Settings that suit a survey, from its mean edge alone.
+//!
+//! A grain needs some 50 triangles to have axes, so the mesh decides what can be seen; and the closer a
+//! camera was, the smaller the grains that it was meant for. Without colours and at 10 mm or more a mesh is
+//! most likely made from a laser scan.
+
+use super::SurfaceFigures;
+use serde::Serialize;
+use std::f64::consts::PI;
+
+/// Triangles that the smallest measurable grain needs.
+const SMALLEST_GRAIN_TRIANGLES: f64 = 50.0;
+
+/// A settings file under `configs/`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Preset {
+    /// Mean edge below 1 mm.
+    Sandbox,
+    /// Mean edge below 5 mm.
+    Mast,
+    /// Anything coarser.
+    Drone,
+    /// Mean edge of 10 mm or more, and no colours.
+    LaserScan,
+}
+
+impl Preset {
+    fn of(mean_edge_m: f64, has_colors: bool) -> Preset {
+        if mean_edge_m >= 0.010 && !has_colors {
+            Preset::LaserScan
+        } else if mean_edge_m < 0.001 {
+            Preset::Sandbox
+        } else if mean_edge_m < 0.005 {
+            Preset::Mast
+        } else {
+            Preset::Drone
+        }
+    }
+
+    /// The file's name without its end, as in `configs/laser-scan.toml`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Preset::Sandbox => "sandbox",
+            Preset::Mast => "mast",
+            Preset::Drone => "drone",
+            Preset::LaserScan => "laser-scan",
+        }
+    }
+
+    /// Widest grain to expect at such a survey, metres.
+    fn max_grain_m(self) -> f64 {
+        match self {
+            Preset::Sandbox => 0.25,
+            Preset::Mast => 1.0,
+            Preset::Drone | Preset::LaserScan => 2.0,
+        }
+    }
+}
+
+/// What a survey can show, and settings for it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Suggestion {
+    /// Visible surface of the smallest measurable grain, m²: 50 mean triangles.
+    pub smallest_grain_area_m2: f64,
+    /// Diameter of the circle of that area, metres.
+    pub smallest_grain_diameter_m: f64,
+    /// The settings file that suits.
+    pub preset: Preset,
+    /// For `--min-grain-area`, m²: the above, rounded up to two digits.
+    pub min_grain_area_m2: f64,
+    /// For `--max-grain`, metres.
+    pub max_grain_m: f64,
+    /// Whether the mean edge is above 30 mm, so that only boulders can be told apart.
+    pub coarse: bool,
+}
+
+impl Suggestion {
+    /// The suggestion for a surface.
+    pub fn new(surface: &SurfaceFigures, has_colors: bool) -> Suggestion {
+        let area = SMALLEST_GRAIN_TRIANGLES * surface.mean_triangle_area_m2;
+        let preset = Preset::of(surface.mean_edge_m, has_colors);
+        Suggestion {
+            smallest_grain_area_m2: area,
+            smallest_grain_diameter_m: (4.0 * area / PI).sqrt(),
+            preset,
+            min_grain_area_m2: round_up(area),
+            max_grain_m: preset.max_grain_m(),
+            coarse: surface.mean_edge_m > 0.030,
+        }
+    }
+}
+
+/// The next number of two digits that is not lower; 0 for 0.
+fn round_up(value: f64) -> f64 {
+    if value <= 0.0 || !value.is_finite() {
+        return 0.0;
+    }
+    let exponent = value.log10().floor() as i32 - 1;
+    // Through text, so that 1.3e-5 is the number of that name and not 13 times a rounded power.
+    let digits = (value / 10f64.powi(exponent) - 1e-9).ceil();
+    format!("{digits}e{exponent}").parse().unwrap_or(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn areas_are_rounded_up_to_two_digits() {
+        assert_eq!(round_up(1.21e-5), 1.3e-5);
+        assert_eq!(round_up(4e-5), 4e-5);
+        assert_eq!(round_up(9.95e-3), 1e-2);
+        assert_eq!(round_up(0.0), 0.0);
+    }
+
+    #[test]
+    fn the_mean_edge_chooses_the_preset() {
+        assert_eq!(Preset::of(0.0004, true), Preset::Sandbox);
+        assert_eq!(Preset::of(0.002, false), Preset::Mast);
+        assert_eq!(Preset::of(0.02, true), Preset::Drone);
+        assert_eq!(Preset::of(0.0167, false), Preset::LaserScan);
+        assert_eq!(Preset::of(0.008, false), Preset::Drone);
+    }
+}

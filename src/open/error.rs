@@ -1,0 +1,176 @@
+//! What can be wrong with a survey's files.
+
+/// A survey that cannot be opened: what, where, why, and what to do.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs, reason = "each variant's message names every field")]
+pub enum OpenError {
+    /// No input was named.
+    #[error("no input file was given\nhelp: name one or several PLY meshes")]
+    NoFiles,
+    /// The path leads nowhere.
+    #[error("{path}: there is no such file\nhelp: check the path; a relative path starts at the working directory")]
+    Missing { path: String },
+    /// The path is a directory.
+    #[error("{path}: is a directory, not a mesh\nhelp: name the files in it, for instance {path}/*.ply")]
+    Directory { path: String },
+    /// The path is a pipe, socket or device.
+    #[error("{path}: is not a regular file, so it cannot be memory-mapped\nhelp: save the data to a file first")]
+    NotAFile { path: String },
+    /// The file exists, but the system refuses to read or map it.
+    #[error("{path}: cannot be read: {source}\nhelp: check the file's permissions and that its disk is mounted")]
+    Unreadable { path: String, source: std::io::Error },
+    /// The file has no bytes.
+    #[error("{path}: is empty (0 bytes)\nhelp: the export or copy did not finish; export it again")]
+    Empty { path: String },
+
+    /// The first line is not `ply`.
+    #[error(
+        "{path}: is not a PLY file: it starts with `{start}`, not with a line `ply`\nhelp: this version reads PLY \
+         meshes; export the mesh as binary PLY, for instance from CloudCompare or MeshLab"
+    )]
+    NotPly { path: String, start: String },
+    /// The header does not end.
+    #[error(
+        "{path}: the PLY header has no line `end_header` in the first {searched} bytes\nhelp: the file is cut off or \
+         is not PLY; export it again"
+    )]
+    HeaderUnended { path: String, searched: u64 },
+    /// A header line that is not PLY.
+    #[error(
+        "{path}: header line {line} cannot be understood: `{text}` ({reason})\nhelp: export the mesh again as PLY 1.0"
+    )]
+    HeaderLine { path: String, line: u64, text: String, reason: String },
+    /// An encoding that is not read.
+    #[error(
+        "{path}: is {encoding} PLY; this version reads binary_little_endian only\nhelp: open it in CloudCompare or \
+         MeshLab and save it as binary PLY"
+    )]
+    Encoding { path: String, encoding: String },
+    /// An element is declared twice.
+    #[error(
+        "{path}: the header declares element `{element}` twice\nhelp: export the mesh again with one `{element}` element"
+    )]
+    RepeatedElement { path: String, element: String },
+    /// There is no `vertex` element.
+    #[error(
+        "{path}: the header declares no element `vertex` (it declares: {found})\nhelp: export a triangle mesh as PLY"
+    )]
+    NoVertexElement { path: String, found: String },
+    /// The file has no vertices.
+    #[error("{path}: has 0 vertices\nhelp: the mesh is empty; check the export")]
+    NoVertices { path: String },
+    /// The file is a point cloud.
+    #[error(
+        "{path}: has {vertices} vertices but no faces: it is a point cloud, which this version does not read yet\n\
+         help: mesh it first, for instance with Poisson reconstruction in CloudCompare or MeshLab"
+    )]
+    PointCloud { path: String, vertices: u64 },
+    /// The file holds triangle strips.
+    #[error(
+        "{path}: holds triangle strips (element `tristrips`), which are not read\nhelp: open it in MeshLab and save it \
+         again, which writes single faces"
+    )]
+    TriangleStrips { path: String },
+    /// A property is missing.
+    #[error(
+        "{path}: element `{element}` has no property `{property}` (it has: {found})\nhelp: export the mesh again with \
+         this property"
+    )]
+    PropertyMissing { path: String, element: &'static str, property: &'static str, found: String },
+    /// A property of an unusable kind.
+    #[error(
+        "{path}: property `{property}` of element `{element}` is `{kind}`, but must be {expected}\nhelp: export the \
+         mesh again, for instance from CloudCompare or MeshLab"
+    )]
+    PropertyKind { path: String, element: String, property: String, kind: String, expected: &'static str },
+    /// A needed vertex property lies behind a list.
+    #[error(
+        "{path}: vertex property `{property}` follows the list `{list}`, so that its place differs from vertex to \
+         vertex\nhelp: open the file in MeshLab and save it without `{list}`"
+    )]
+    PropertyAfterList { path: String, property: String, list: String },
+
+    /// The file ends too early.
+    #[error(
+        "{path}: the file ends at byte {bytes}, within {element} {index} of {count}\nhelp: the file is cut off; copy \
+         or export it again"
+    )]
+    Truncated { path: String, bytes: u64, element: String, index: u64, count: u64 },
+    /// A list with a negative length.
+    #[error(
+        "{path}: {element} {index}: list `{property}` has {length} entries (byte {byte})\nhelp: the data do not match \
+         the header; export the file again"
+    )]
+    ListLength { path: String, element: String, index: u64, property: String, length: i64, byte: u64 },
+    /// A face that is no polygon.
+    #[error(
+        "{path}: face {face} has {corners} corners (byte {byte}); a face needs at least 3\nhelp: clean the mesh, for \
+         instance in MeshLab with Filters > Cleaning and Repairing, or export it again"
+    )]
+    FewCorners { path: String, face: u64, corners: u64, byte: u64 },
+    /// A face that names a vertex that is not there.
+    #[error(
+        "{path}: face {face} refers to vertex {index}, but the file has {vertices} vertices (0 to {last})\nhelp: the \
+         file is damaged or its index type is too narrow; export it again",
+        last = vertices.saturating_sub(1)
+    )]
+    VertexIndex { path: String, face: u64, index: i64, vertices: u64 },
+    /// More polygons than the face table can number.
+    #[error(
+        "{path}: has {faces} faces, not all triangles: above {limit} faces only pure triangle meshes are read\nhelp: \
+         triangulate the mesh",
+        limit = u32::MAX
+    )]
+    TooManyPolygons { path: String, faces: u64 },
+    /// A coordinate that is no number.
+    #[error(
+        "{path}: vertex {vertex}: property `{property}` is {value}\nhelp: remove vertices without finite coordinates, \
+         for instance in MeshLab with Remove Vertices > NaN, or export the mesh again"
+    )]
+    NotFinite { path: String, vertex: u64, property: &'static str, value: f64 },
+    /// A survey too wide to be one.
+    #[error(
+        "{path}: the survey spans {extent_m:.6e} m along {axis}, from {min} to {max} in input units; more than \
+         {limit_m:e} m is no reach\nhelp: set the unit (--unit mm for millimetres), remove stray vertices, or run far \
+         apart files one by one"
+    )]
+    Extent { path: String, axis: char, min: f64, max: f64, extent_m: f64, limit_m: f64 },
+    /// Coordinates destroyed by 32-bit floats.
+    #[error(
+        "{path}: coordinates are 32-bit floats as large as {largest}, where they step by {step_m:.3e} m, but the mean \
+         edge is only {edge_m:.3e} m long: the surface is destroyed\nhelp: export it again with double coordinates, or \
+         shifted to small ones with the shift given as --offset"
+    )]
+    FloatStep { path: String, largest: f64, step_m: f64, edge_m: f64 },
+
+    /// A CRS that is neither code, text nor file.
+    #[error("--crs {text}: is neither EPSG:n, nor WKT, nor a file\nhelp: give a code such as EPSG:2193 or a .prj file")]
+    CrsForm { text: String },
+    /// A CRS file that cannot be read.
+    #[error(
+        "--crs {path}: cannot be read: {source}\nhelp: give a code such as EPSG:2193, or a text file that holds WKT"
+    )]
+    CrsFile { path: String, source: std::io::Error },
+    /// A CRS that GDAL does not know.
+    #[error("--crs {text}: GDAL cannot make a coordinate system of it: {message}\nhelp: check the code or the WKT")]
+    CrsUnknown { text: String, message: String },
+    /// A CRS without plane coordinates.
+    #[error(
+        "--crs {text}: {name} is {kind}, not a projected system, so lengths cannot be measured in it\nhelp: project the \
+         mesh, for instance to the UTM zone of the site, and name that system"
+    )]
+    CrsKind { text: String, name: String, kind: &'static str },
+    /// A compound CRS of two units.
+    #[error(
+        "--crs {text}: {name} measures plan in units of {plan_m} m and height in units of {height_m} m\nhelp: bring \
+         heights and plan to one unit and name a system that uses it"
+    )]
+    CrsUnits { text: String, name: String, plan_m: f64, height_m: f64 },
+    /// PROJ is not installed properly.
+    #[error(
+        "--crs {text}: PROJ does not find its database: {message}\nhelp: set PROJ_DATA (PROJ 9.1 and newer) or PROJ_LIB \
+         to the directory that holds proj.db, often /usr/share/proj"
+    )]
+    ProjDatabase { text: String, message: String },
+}

@@ -1,0 +1,241 @@
+//! The faces of a PLY file, cut into triangles.
+//!
+//! A file of triangles whose records all have the same length needs no table at all: that is checked for
+//! every record, in parallel. Anything else is walked once, record by record, and tabulated.
+
+use super::error::OpenError;
+use super::ply_header::{Element, Kind};
+use super::progress::Progress;
+use super::records::{CHUNK, Source, Walk};
+use super::scalar::Scalar;
+use rayon::prelude::*;
+
+/// Names under which the corners are written.
+const CORNER_NAMES: [&str; 2] = ["vertex_indices", "vertex_index"];
+
+/// The faces of a PLY file. Polygons are fans of triangles about their first corner, in file order.
+#[derive(Debug)]
+pub(super) struct Faces {
+    pub(super) count: u64,
+    pub(super) triangles: u64,
+    length: Scalar,
+    index: Scalar,
+    shape: Shape,
+}
+
+#[derive(Debug)]
+enum Shape {
+    /// Triangles only; list `i` starts at `first_list + i * stride`.
+    Fixed { first_list: u64, stride: u64 },
+    /// Triangles only; list `i` starts at entry `i`.
+    Triangles(Vec<u64>),
+    /// Polygons among them.
+    Polygons { list_at: Vec<u64>, first_triangle: Vec<u64>, face_of: Vec<u32> },
+}
+
+/// The list of corners within a face record.
+#[derive(Clone, Copy)]
+struct Corners {
+    property: usize,
+    length: Scalar,
+    index: Scalar,
+}
+
+enum Flaw {
+    /// The list at this byte has another length than 3.
+    NotATriangle,
+    Index(i64),
+}
+
+impl Faces {
+    /// Finds and validates the faces, whose element starts at byte `start`, and the byte behind them.
+    ///
+    /// # Errors
+    /// No usable list of corners, fewer than 3 corners, a vertex that is not there, the file ends too early.
+    pub(super) fn read(
+        source: Source<'_>,
+        element: &Element,
+        start: u64,
+        vertices: u64,
+        progress: &Progress<'_>,
+    ) -> Result<(Faces, u64), OpenError> {
+        let corners = find_corners(source.path, element)?;
+        if let Some(found) = read_fixed(source, element, start, (corners, vertices), progress)? {
+            return Ok(found);
+        }
+        read_walking(source, element, start, (corners, vertices), progress)
+    }
+
+    /// Byte at which the list of a face starts.
+    fn list_at(&self, face: u64) -> usize {
+        match &self.shape {
+            Shape::Fixed { first_list, stride } => (first_list + face * stride) as usize,
+            Shape::Triangles(list_at) | Shape::Polygons { list_at, .. } => list_at[face as usize] as usize,
+        }
+    }
+
+    /// The corners of a triangle, vertex numbers of this file.
+    #[inline]
+    pub(super) fn triangle(&self, bytes: &[u8], triangle: u64) -> [u64; 3] {
+        let (list, k) = match &self.shape {
+            Shape::Fixed { first_list, stride } => ((first_list + triangle * stride) as usize, 0),
+            Shape::Triangles(list_at) => (list_at[triangle as usize] as usize, 0),
+            Shape::Polygons { list_at, first_triangle, face_of } => {
+                let face = face_of[triangle as usize] as usize;
+                (list_at[face] as usize, (triangle - first_triangle[face]) as usize)
+            }
+        };
+        let (first, size) = (list + self.length.size(), self.index.size());
+        // Validated to lie in 0..vertices, so the sign is gone.
+        [0, k + 1, k + 2].map(|corner| self.index.integer(&bytes[first + corner * size..]) as u64)
+    }
+
+    /// The face that a triangle is part of.
+    #[inline]
+    pub(super) fn face_of(&self, triangle: u64) -> u64 {
+        match &self.shape {
+            Shape::Polygons { face_of, .. } => u64::from(face_of[triangle as usize]),
+            _ => triangle,
+        }
+    }
+
+    /// The corners of a face as the file has them, vertex numbers of this file.
+    pub(super) fn corners<'b>(&self, bytes: &'b [u8], face: u64) -> impl ExactSizeIterator<Item = u64> + use<'b> {
+        let list = self.list_at(face);
+        let entries = self.length.integer(&bytes[list..]) as usize;
+        let (first, index) = (list + self.length.size(), self.index);
+        (0..entries).map(move |corner| index.integer(&bytes[first + corner * index.size()..]) as u64)
+    }
+}
+
+fn find_corners(path: &str, element: &Element) -> Result<Corners, OpenError> {
+    let found = CORNER_NAMES.iter().find_map(|name| element.properties.iter().position(|p| p.name == *name));
+    let Some(property) = found else {
+        return Err(OpenError::PropertyMissing {
+            path: path.to_owned(),
+            element: "face",
+            property: CORNER_NAMES[0],
+            found: element.property_names(),
+        });
+    };
+    match element.properties[property].kind {
+        Kind::List { length, entry } if entry.is_integer() => Ok(Corners { property, length, index: entry }),
+        kind => Err(OpenError::PropertyKind {
+            path: path.to_owned(),
+            element: "face".into(),
+            property: element.properties[property].name.clone(),
+            kind: kind.to_string(),
+            expected: "a list of an integer type",
+        }),
+    }
+}
+
+/// Reads faces that are all triangles with numbers around them; `None` if they are something else.
+fn read_fixed(
+    source: Source<'_>,
+    element: &Element,
+    start: u64,
+    (corners, vertices): (Corners, u64),
+    progress: &Progress<'_>,
+) -> Result<Option<(Faces, u64)>, OpenError> {
+    let Corners { property, length, index } = corners;
+    let before = Walk::new(source, element, 0..property).stride();
+    let after = Walk::new(source, element, property + 1..element.properties.len()).stride();
+    let (Some(before), Some(after)) = (before, after) else { return Ok(None) };
+    let stride = before + length.size() as u64 + 3 * index.size() as u64 + after;
+    let room = (source.bytes.len() as u64).saturating_sub(start);
+    // Where the faces do not fit as triangles the walk says which one is cut off.
+    if element.count.checked_mul(stride).is_none_or(|bytes| bytes > room) {
+        return Ok(None);
+    }
+    let first_list = start + before;
+    let faces = Faces {
+        count: element.count,
+        triangles: element.count,
+        length,
+        index,
+        shape: Shape::Fixed { first_list, stride },
+    };
+    let look = |face: u64| {
+        let list = &source.bytes[(first_list + face * stride) as usize..];
+        if length.integer(list) != 3 {
+            return Some((face, Flaw::NotATriangle));
+        }
+        let list = &list[length.size()..];
+        let index_at = |corner: usize| index.integer(&list[corner * index.size()..]);
+        (0..3).map(index_at).find(|&i| i < 0 || i as u64 >= vertices).map(|i| (face, Flaw::Index(i)))
+    };
+    // The first flaw in file order decides: behind a polygon, fixed strides read nonsense.
+    let flaw = (0..element.count.div_ceil(CHUNK)).into_par_iter().find_map_first(|chunk| {
+        let (first, last) = (chunk * CHUNK, ((chunk + 1) * CHUNK).min(element.count));
+        let flaw = (first..last).find_map(look);
+        progress.add((last - first) * stride);
+        flaw
+    });
+    match flaw {
+        None => Ok(Some((faces, start + element.count * stride))),
+        Some((_, Flaw::NotATriangle)) => Ok(None),
+        Some((face, Flaw::Index(index))) => {
+            Err(OpenError::VertexIndex { path: source.path.to_owned(), face, index, vertices })
+        }
+    }
+}
+
+/// Reads faces one behind the other.
+fn read_walking(
+    source: Source<'_>,
+    element: &Element,
+    start: u64,
+    (corners, vertices): (Corners, u64),
+    progress: &Progress<'_>,
+) -> Result<(Faces, u64), OpenError> {
+    let Corners { property, length, index } = corners;
+    let before = Walk::new(source, element, 0..property);
+    let list = Walk::new(source, element, property..property + 1);
+    let after = Walk::new(source, element, property + 1..element.properties.len());
+    // Grown while records are found, never reserved from the header's count.
+    let (mut list_at, mut first_triangle, mut triangles) = (Vec::new(), Vec::new(), 0);
+    let (mut at, mut told) = (start, start);
+    for face in 0..element.count {
+        let byte = before.end(at, face)?;
+        let entries = list.list_length(length, byte, face, property)?;
+        let end = list.end(byte, face)?;
+        if entries < 3 {
+            let path = source.path.to_owned();
+            return Err(OpenError::FewCorners { path, face, corners: entries, byte });
+        }
+        for corner in source.bytes[byte as usize + length.size()..end as usize].chunks_exact(index.size()) {
+            let index = index.integer(corner);
+            if index < 0 || index as u64 >= vertices {
+                return Err(OpenError::VertexIndex { path: source.path.to_owned(), face, index, vertices });
+            }
+        }
+        list_at.push(byte);
+        first_triangle.push(triangles);
+        triangles += entries - 2;
+        at = after.end(end, face)?;
+        if face % CHUNK == CHUNK - 1 {
+            progress.add(at - told);
+            told = at;
+        }
+    }
+    let shape = if triangles == element.count {
+        Shape::Triangles(list_at)
+    } else {
+        let face_of = faces_of_triangles(source.path, &first_triangle, triangles)?;
+        Shape::Polygons { list_at, first_triangle, face_of }
+    };
+    Ok((Faces { count: element.count, triangles, length, index, shape }, at))
+}
+
+fn faces_of_triangles(path: &str, first_triangle: &[u64], triangles: u64) -> Result<Vec<u32>, OpenError> {
+    let faces = first_triangle.len() as u64;
+    if faces > u64::from(u32::MAX) {
+        return Err(OpenError::TooManyPolygons { path: path.to_owned(), faces });
+    }
+    let ends = first_triangle.iter().skip(1).copied().chain([triangles]);
+    Ok((0u32..)
+        .zip(first_triangle.iter().zip(ends))
+        .flat_map(|(face, (&first, end))| (first..end).map(move |_| face))
+        .collect())
+}

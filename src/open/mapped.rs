@@ -1,0 +1,74 @@
+//! Read-only memory maps of the input files: the only unsafe code of the crate.
+//!
+//! # Contract
+//! A mapped file must not be truncated or rewritten in place while it is open. The system answers a read
+//! beyond the new end with `SIGBUS`, which ends the program; a rewrite changes bytes that were already
+//! validated, so that an index may then be out of range (a panic, never a read outside the map). Writers
+//! that replace a file by renaming a new one over it are safe: the map keeps the old one.
+#![allow(unsafe_code)]
+
+use super::error::OpenError;
+use memmap2::Mmap;
+use std::fs::{self, File};
+use std::io::ErrorKind;
+use std::ops::Deref;
+use std::path::Path;
+use std::time::UNIX_EPOCH;
+
+/// The bytes of one input file.
+#[derive(Debug)]
+pub(super) struct MappedFile {
+    map: Mmap,
+    modified_s: i64,
+}
+
+impl MappedFile {
+    /// Maps a file for reading.
+    ///
+    /// # Errors
+    /// Missing or unreadable file, directory or device, empty file.
+    pub(super) fn open(path: &Path) -> Result<MappedFile, OpenError> {
+        let name = || path.display().to_string();
+        let unreadable = |source: std::io::Error| match source.kind() {
+            ErrorKind::NotFound => OpenError::Missing { path: name() },
+            _ => OpenError::Unreadable { path: name(), source },
+        };
+        // Asked before opening: opening a named pipe would wait for its writer for ever.
+        let kind = fs::metadata(path).map_err(unreadable)?;
+        if kind.is_dir() {
+            return Err(OpenError::Directory { path: name() });
+        }
+        if !kind.is_file() {
+            return Err(OpenError::NotAFile { path: name() });
+        }
+        let file = File::open(path).map_err(unreadable)?;
+        let facts = file.metadata().map_err(unreadable)?;
+        if facts.len() == 0 {
+            return Err(OpenError::Empty { path: name() });
+        }
+        // SAFETY: the map is read-only and private to this value, which lives as long as any slice of it.
+        // That nobody truncates or rewrites the file meanwhile is the contract above, which no program can
+        // enforce on Linux; every index into the slice is bounds-checked, so a breach cannot read outside it.
+        let map = unsafe { Mmap::map(&file) }.map_err(unreadable)?;
+        let modified_s = facts
+            .modified()
+            .ok()
+            .and_then(|t| t.duration_since(UNIX_EPOCH).ok())
+            .map_or(0, |t| i64::try_from(t.as_secs()).unwrap_or(i64::MAX));
+        Ok(MappedFile { map, modified_s })
+    }
+
+    /// Time of the last change, seconds since 1970; 0 where the file system does not tell.
+    pub(super) fn modified_s(&self) -> i64 {
+        self.modified_s
+    }
+}
+
+impl Deref for MappedFile {
+    type Target = [u8];
+
+    #[inline]
+    fn deref(&self) -> &[u8] {
+        &self.map
+    }
+}

@@ -1,0 +1,226 @@
+//! PLY headers: which elements follow, in which order, with which properties.
+//!
+//! The grammar is that of `ply-rs-bw`. Lines are cut here, because the byte at which the payload starts
+//! must be known exactly, and names are swapped for plain ones before the grammar sees them, because it
+//! refuses names that CloudCompare writes (`scalar_CANUPO.class`), merges properties of the same name
+//! (which would shift every byte behind them) and stops at comments that are not UTF-8.
+
+use super::error::OpenError;
+use super::scalar::Scalar;
+use ply_rs_bw::parser::{Parser, Reader};
+use ply_rs_bw::ply::{DefaultElement, Encoding, PropertyType, ScalarType};
+use std::fmt;
+
+/// Longest header that is looked for, bytes.
+const LONGEST_HEADER: usize = 1 << 20;
+
+/// What a PLY file declares.
+#[derive(Debug, Clone)]
+pub(super) struct PlyHeader {
+    /// Encoding of the payload.
+    pub(super) encoding: Encoding,
+    /// Elements in file order.
+    pub(super) elements: Vec<Element>,
+    /// `comment` and `obj_info` texts in file order.
+    pub(super) comments: Vec<String>,
+    /// First byte of the payload.
+    pub(super) payload: u64,
+}
+
+/// One element: `count` records of the same properties.
+#[derive(Debug, Clone)]
+pub(super) struct Element {
+    pub(super) name: String,
+    pub(super) count: u64,
+    pub(super) properties: Vec<Property>,
+}
+
+/// One property of an element.
+#[derive(Debug, Clone)]
+pub(super) struct Property {
+    pub(super) name: String,
+    pub(super) kind: Kind,
+}
+
+/// A number or a list of numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Number(Scalar),
+    List { length: Scalar, entry: Scalar },
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Kind::Number(scalar) => f.write_str(scalar.ply_name()),
+            Kind::List { length, entry } => write!(f, "list {} {}", length.ply_name(), entry.ply_name()),
+        }
+    }
+}
+
+impl Element {
+    /// The names of the properties, for messages.
+    pub(super) fn property_names(&self) -> String {
+        self.properties.iter().map(|p| p.name.as_str()).collect::<Vec<_>>().join(", ")
+    }
+}
+
+impl PlyHeader {
+    /// Reads the header at the start of `bytes`; `path` is for messages.
+    ///
+    /// # Errors
+    /// No PLY, no end, a line outside the grammar, an element declared twice, a list whose length is a float.
+    pub(super) fn parse(path: &str, bytes: &[u8]) -> Result<PlyHeader, OpenError> {
+        let lines = HeaderLines::cut(path, bytes)?;
+        let plain = PlainHeader::new(&lines.texts);
+        let mut reader = Reader::new(plain.text.as_bytes());
+        let parsed = Parser::<DefaultElement>::new().read_header(&mut reader).map_err(|e| {
+            let line = e.line().unwrap_or(1);
+            let text = lines.texts.get(line.saturating_sub(1)).cloned().unwrap_or_default();
+            // The first line of the parser's message says what; the rest quotes the plain text, not the file's.
+            let full = e.to_string();
+            let reason = full.lines().next().unwrap_or_default();
+            let reason = reason.split_once(": ").map_or(reason, |(_, r)| r).trim_end_matches('.').to_owned();
+            OpenError::HeaderLine { path: path.to_owned(), line: line as u64, text: shorten(&text), reason }
+        })?;
+        let mut names = plain.names.into_iter();
+        let mut name = || names.next().unwrap_or_default();
+        let elements = parsed
+            .elements
+            .values()
+            .map(|e| Element {
+                name: name(),
+                count: e.count as u64,
+                properties: e
+                    .properties
+                    .values()
+                    .map(|p| Property { name: name(), kind: kind_of(&p.data_type) })
+                    .collect(),
+            })
+            .collect();
+        let header =
+            PlyHeader { encoding: parsed.encoding, elements, comments: plain.comments, payload: lines.payload };
+        header.check(path)?;
+        Ok(header)
+    }
+
+    fn check(&self, path: &str) -> Result<(), OpenError> {
+        for (i, element) in self.elements.iter().enumerate() {
+            if self.elements[..i].iter().any(|e| e.name == element.name) {
+                return Err(OpenError::RepeatedElement { path: path.to_owned(), element: element.name.clone() });
+            }
+            for property in &element.properties {
+                if let Kind::List { length, .. } = property.kind
+                    && !length.is_integer()
+                {
+                    return Err(OpenError::PropertyKind {
+                        path: path.to_owned(),
+                        element: element.name.clone(),
+                        property: property.name.clone(),
+                        kind: property.kind.to_string(),
+                        expected: "a list whose length is an integer type",
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The element of that name.
+    pub(super) fn element(&self, name: &str) -> Option<&Element> {
+        self.elements.iter().find(|e| e.name == name)
+    }
+}
+
+fn kind_of(kind: &PropertyType) -> Kind {
+    let scalar = |s: &ScalarType| match s {
+        ScalarType::Char => Scalar::I8,
+        ScalarType::UChar => Scalar::U8,
+        ScalarType::Short => Scalar::I16,
+        ScalarType::UShort => Scalar::U16,
+        ScalarType::Int => Scalar::I32,
+        ScalarType::UInt => Scalar::U32,
+        ScalarType::Float => Scalar::F32,
+        ScalarType::Double => Scalar::F64,
+    };
+    match kind {
+        PropertyType::Scalar(s) => Kind::Number(scalar(s)),
+        PropertyType::List(length, entry) => Kind::List { length: scalar(length), entry: scalar(entry) },
+    }
+}
+
+fn shorten(text: &str) -> String {
+    text.chars().filter(|c| !c.is_control()).take(80).collect()
+}
+
+/// The header's lines without their ends, `end_header` included, and the byte behind them.
+struct HeaderLines {
+    texts: Vec<String>,
+    payload: u64,
+}
+
+impl HeaderLines {
+    fn cut(path: &str, bytes: &[u8]) -> Result<HeaderLines, OpenError> {
+        let head = &bytes[..bytes.len().min(LONGEST_HEADER)];
+        let (mut texts, mut at, mut old_mac) = (Vec::new(), 0, false);
+        while at < head.len() {
+            let end = head[at..].iter().position(|&b| b == b'\n' || b == b'\r').map_or(head.len(), |n| at + n);
+            let text = String::from_utf8_lossy(&head[at..end]).trim().to_owned();
+            let crlf = head[end..].starts_with(b"\r\n");
+            if texts.is_empty() {
+                if text != "ply" {
+                    return Err(OpenError::NotPly { path: path.to_owned(), start: shorten(&text) });
+                }
+                old_mac = head.get(end) == Some(&b'\r') && !crlf;
+            }
+            // With lone carriage returns, a line feed behind `end_header` is the first byte of the payload.
+            at = (end + if crlf && !old_mac { 2 } else { 1 }).min(head.len());
+            let last = text == "end_header";
+            texts.push(text);
+            if last {
+                return Ok(HeaderLines { texts, payload: at as u64 });
+            }
+        }
+        Err(OpenError::HeaderUnended { path: path.to_owned(), searched: head.len() as u64 })
+    }
+}
+
+/// The header with plain names, line by line as in the file; what was taken out of it lies beside.
+struct PlainHeader {
+    text: String,
+    names: Vec<String>,
+    comments: Vec<String>,
+}
+
+impl PlainHeader {
+    fn new(lines: &[String]) -> PlainHeader {
+        let mut plain = PlainHeader { text: String::new(), names: Vec::new(), comments: Vec::new() };
+        for line in lines {
+            let words: Vec<&str> = line.split_ascii_whitespace().collect();
+            let rewritten = match words.as_slice() {
+                [] => "comment".to_owned(),
+                [first @ ("comment" | "obj_info"), ..] => {
+                    plain.comments.push(line[first.len()..].trim().to_owned());
+                    "comment".to_owned()
+                }
+                ["element", name, count] => {
+                    let n = plain.name(name);
+                    format!("element n{n} {count}")
+                }
+                ["property", kind @ .., name] if !kind.is_empty() => {
+                    let n = plain.name(name);
+                    format!("property {} n{n}", kind.join(" "))
+                }
+                _ => words.join(" "),
+            };
+            plain.text.push_str(&rewritten);
+            plain.text.push('\n');
+        }
+        plain
+    }
+
+    fn name(&mut self, name: &str) -> usize {
+        self.names.push(name.to_owned());
+        self.names.len()
+    }
+}

@@ -1,0 +1,171 @@
+//! One file of a survey, as others see it.
+
+use super::ply::PlyMesh;
+use super::precision::coarsest_step;
+use super::scalar::Scalar;
+use super::vertices::ScalarProperty;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// What tells a file from another version of itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Fingerprint {
+    /// Length, bytes.
+    pub bytes: u64,
+    /// Time of the last change, seconds since 1970.
+    pub modified_s: i64,
+    /// FNV-1a (64 bit) of the first and the last 64 KiB.
+    pub ends_fnv1a64: u64,
+}
+
+/// Length of each end that goes into a fingerprint, bytes.
+const END_BYTES: usize = 64 << 10;
+
+impl Fingerprint {
+    fn of(bytes: &[u8], modified_s: i64) -> Fingerprint {
+        let end = bytes.len().min(END_BYTES);
+        let hash = fnv1a64(fnv1a64(FNV_BASIS, &bytes[..end]), &bytes[bytes.len() - end..]);
+        Fingerprint { bytes: bytes.len() as u64, modified_s, ends_fnv1a64: hash }
+    }
+}
+
+const FNV_BASIS: u64 = 0xcbf2_9ce4_8422_2325;
+
+fn fnv1a64(start: u64, bytes: &[u8]) -> u64 {
+    bytes.iter().fold(start, |hash, &b| (hash ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3))
+}
+
+/// One validated file of a survey. Vertices, faces and triangles count from 0 in each file; the survey's
+/// numbers are these plus `first_vertex`, `first_face`, `first_triangle`.
+#[derive(Debug)]
+pub struct SurveyFile {
+    pub(super) path: PathBuf,
+    pub(super) mesh: PlyMesh,
+    pub(super) first_vertex: u64,
+    pub(super) first_face: u64,
+    pub(super) first_triangle: u64,
+    pub(super) fingerprint: Fingerprint,
+}
+
+impl SurveyFile {
+    pub(super) fn new(path: &Path, mesh: PlyMesh, before: Option<&SurveyFile>) -> SurveyFile {
+        let fingerprint = Fingerprint::of(mesh.bytes(), mesh.modified_s());
+        SurveyFile {
+            path: path.to_owned(),
+            mesh,
+            first_vertex: before.map_or(0, |f| f.first_vertex + f.vertices()),
+            first_face: before.map_or(0, |f| f.first_face + f.faces()),
+            first_triangle: before.map_or(0, |f| f.first_triangle + f.triangles()),
+            fingerprint,
+        }
+    }
+
+    /// The path as given.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Length, bytes.
+    pub fn bytes(&self) -> u64 {
+        self.fingerprint.bytes
+    }
+
+    /// Number of vertices, unused ones included.
+    pub fn vertices(&self) -> u64 {
+        self.mesh.vertices.count
+    }
+
+    /// Number of faces as the file has them.
+    pub fn faces(&self) -> u64 {
+        self.mesh.faces.count
+    }
+
+    /// Number of triangles into which the faces are cut.
+    pub fn triangles(&self) -> u64 {
+        self.mesh.faces.triangles
+    }
+
+    /// Survey number of the file's first vertex.
+    pub fn first_vertex(&self) -> u64 {
+        self.first_vertex
+    }
+
+    /// Survey number of the file's first face.
+    pub fn first_face(&self) -> u64 {
+        self.first_face
+    }
+
+    /// Survey number of the file's first triangle.
+    pub fn first_triangle(&self) -> u64 {
+        self.first_triangle
+    }
+
+    /// What tells the file from another version of itself.
+    pub fn fingerprint(&self) -> Fingerprint {
+        self.fingerprint
+    }
+
+    /// Format and encoding, such as `PLY binary_little_endian`.
+    pub fn format(&self) -> String {
+        format!("PLY {}", self.mesh.header.encoding)
+    }
+
+    /// Types of x, y and z.
+    pub fn axis_types(&self) -> [Scalar; 3] {
+        self.mesh.vertices.axis_types
+    }
+
+    /// Type of the colours, if the file has any that are read.
+    pub fn color_type(&self) -> Option<Scalar> {
+        self.mesh.vertices.color_type()
+    }
+
+    /// The header's `comment` and `obj_info` texts.
+    pub fn comments(&self) -> &[String] {
+        &self.mesh.header.comments
+    }
+
+    /// Lowest and highest coordinates, input units.
+    pub fn input_bounds(&self) -> ([f64; 3], [f64; 3]) {
+        self.mesh.bounds
+    }
+
+    /// Coarsest distance between neighbouring values of the file's coordinates at their largest, input
+    /// units; `None` if all are whole numbers.
+    pub fn coordinate_step(&self) -> Option<f64> {
+        coarsest_step(self.axis_types(), self.input_bounds()).map(|(step, _)| step)
+    }
+
+    /// The numbers of a vertex record: those before its first list, if it has lists.
+    pub fn vertex_properties(&self) -> &[ScalarProperty] {
+        &self.mesh.vertices.scalars
+    }
+
+    /// The bytes of those numbers, little endian, for a vertex of this file.
+    ///
+    /// # Panics
+    /// Above the file's last vertex.
+    pub fn vertex_record(&self, vertex: u64) -> &[u8] {
+        self.mesh.vertices.record(self.mesh.bytes(), vertex)
+    }
+
+    /// The corners of a face as the file has them: vertices of this file.
+    ///
+    /// # Panics
+    /// Above the file's last face.
+    pub fn face_corners(&self, face: u64) -> impl ExactSizeIterator<Item = u64> + '_ {
+        self.mesh.faces.corners(self.mesh.bytes(), face)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_hash_is_fnv1a_with_64_bits() {
+        assert_eq!(fnv1a64(FNV_BASIS, b""), 0xcbf2_9ce4_8422_2325);
+        assert_eq!(fnv1a64(FNV_BASIS, b"a"), 0xaf63_dc4c_8601_ec8c);
+        assert_eq!(fnv1a64(FNV_BASIS, b"foobar"), 0x8594_4171_f739_67e8);
+    }
+}

@@ -1,0 +1,221 @@
+//! Each malformed file gives its precise error.
+
+use crate::ply_bytes::{Element, axis, corner_lists, faces, file, header, vertices};
+use crate::{assert_contains, open_bytes, refusal};
+use gravelometer::open::{OpenError, Reach};
+use gravelometer::settings::InputSettings;
+use std::path::{Path, PathBuf};
+
+fn refuse_path(path: &Path) -> String {
+    Reach::open(&[path.to_owned()], &InputSettings::default(), &|_, _| {}).expect_err("must be refused").to_string()
+}
+
+#[test]
+fn truncated_vertices_name_the_byte_and_the_vertex() {
+    let head = header(&[&vertices(), &faces()], "\n").len();
+    let whole = file(&[&vertices(), &faces()]);
+    let end = head + 2 * 24 + 5;
+    assert_contains(&refusal(&whole[..end]), &[&format!("ends at byte {end}"), "vertex 2 of 5"]);
+    assert_contains(&refusal(&whole[..head]), &[&format!("ends at byte {head}"), "vertex 0 of 5"]);
+}
+
+#[test]
+fn truncated_faces_name_the_byte_and_the_face() {
+    let whole = file(&[&vertices(), &faces()]);
+    let end = whole.len() - 13 - 1;
+    assert_contains(&refusal(&whole[..end]), &[&format!("ends at byte {end}"), "face 2 of 4"]);
+    let end = whole.len() - 13;
+    assert_contains(&refusal(&whole[..end]), &[&format!("ends at byte {end}"), "face 3 of 4"]);
+}
+
+#[test]
+fn truncated_unknown_elements_name_the_record() {
+    let extra = Element::new("edge").lists("list uchar int ends", [vec![1.0], vec![1.0, 2.0]]);
+    let whole = file(&[&vertices(), &faces(), &extra]);
+    assert_contains(&refusal(&whole[..whole.len() - 3]), &["edge 1 of 2"]);
+}
+
+fn with_face(list: Vec<f64>) -> Vec<u8> {
+    let mut lists: Vec<Vec<f64>> = corner_lists().collect();
+    lists[2] = list;
+    file(&[&vertices(), &Element::new("face").lists("list char int vertex_indices", lists)])
+}
+
+#[test]
+fn an_index_out_of_range_names_face_index_and_vertices() {
+    assert_contains(&refusal(&with_face(vec![0.0, 5.0, 1.0])), &["face 2 refers to vertex 5", "5 vertices"]);
+    assert_contains(&refusal(&with_face(vec![0.0, 1.0, 2.0, 99.0])), &["face 2 refers to vertex 99", "5 vertices"]);
+}
+
+#[test]
+fn a_negative_index_names_face_and_index() {
+    assert_contains(&refusal(&with_face(vec![0.0, 1.0, -1.0])), &["face 2 refers to vertex -1"]);
+    assert_contains(&refusal(&with_face(vec![-7.0, 1.0, 1.0, 1.0])), &["face 2 refers to vertex -7"]);
+}
+
+#[test]
+fn the_first_bad_face_is_named_whatever_follows() {
+    let mut lists: Vec<Vec<f64>> = (0..200_000).map(|_| vec![0.0, 1.0, 2.0]).collect();
+    lists[70_000] = vec![0.0, 1.0, 6.0];
+    lists[190_000] = vec![0.0, 1.0, 7.0];
+    lists[70_001] = vec![0.0, 1.0];
+    let bytes = file(&[&vertices(), &Element::new("face").lists("list uchar int vertex_indices", lists)]);
+    assert_contains(&refusal(&bytes), &["face 70000 refers to vertex 6"]);
+}
+
+#[test]
+fn a_face_of_fewer_than_three_corners_is_named() {
+    for (corners, list) in [(2, vec![0.0, 1.0]), (1, vec![0.0]), (0, vec![])] {
+        assert_contains(&refusal(&with_face(list)), &[&format!("face 2 has {corners} corners")]);
+    }
+}
+
+#[test]
+fn a_negative_list_length_is_named() {
+    let mut bytes = file(&[&vertices(), &Element::new("face").lists("list char int vertex_indices", corner_lists())]);
+    let at = bytes.len() - 2 * 13;
+    bytes[at] = 0xfd;
+    assert_contains(&refusal(&bytes), &["face 2: list `vertex_indices` has -3 entries", &format!("byte {at}")]);
+}
+
+#[test]
+fn coordinates_that_are_no_numbers_name_vertex_and_property() {
+    for (value, shown) in [(f64::NAN, "NaN"), (f64::INFINITY, "inf"), (f64::NEG_INFINITY, "-inf")] {
+        for kind in ["float", "double"] {
+            let y: Vec<f64> = axis(1).enumerate().map(|(i, v)| if i >= 3 { value } else { v }).collect();
+            let vertices = Element::new("vertex")
+                .numbers(&format!("{kind} x"), axis(0))
+                .numbers(&format!("{kind} y"), y)
+                .numbers(&format!("{kind} z"), axis(2));
+            assert_contains(
+                &refusal(&file(&[&vertices, &faces()])),
+                &[&format!("vertex 3: property `y` is {shown}\n")],
+            );
+        }
+    }
+}
+
+#[test]
+fn a_cloud_is_refused_with_what_to_do() {
+    let no_faces = Element::new("face").lists("list uchar int vertex_indices", []);
+    for bytes in [file(&[&vertices(), &no_faces]), file(&[&vertices()])] {
+        assert_contains(&refusal(&bytes), &["5 vertices but no faces", "point cloud", "mesh it"]);
+    }
+}
+
+#[test]
+fn no_vertices_are_refused() {
+    let none = Element::new("vertex").numbers("float x", []).numbers("float y", []).numbers("float z", []);
+    assert_contains(&refusal(&file(&[&none, &faces()])), &["0 vertices"]);
+    assert_contains(&refusal(&file(&[&faces()])), &["no element `vertex`", "face"]);
+}
+
+#[test]
+fn missing_and_unusable_properties_are_named() {
+    let flat = Element::new("vertex").numbers("float x", axis(0)).numbers("float y", axis(1));
+    assert_contains(&refusal(&file(&[&flat, &faces()])), &["`vertex` has no property `z`", "x, y"]);
+    let nameless = Element::new("face").lists("list uchar int corners", corner_lists());
+    assert_contains(
+        &refusal(&file(&[&vertices(), &nameless])),
+        &["`face` has no property `vertex_indices`", "corners"],
+    );
+    let floats = Element::new("face").lists("list uchar float vertex_indices", corner_lists());
+    assert_contains(&refusal(&file(&[&vertices(), &floats])), &["`vertex_indices`", "`list uchar float`", "integer"]);
+    let counted = Element::new("face").lists("list float int vertex_indices", corner_lists());
+    assert_contains(&refusal(&file(&[&vertices(), &counted])), &["`list float int`", "length is an integer type"]);
+    let twice = file(&[&vertices(), &faces(), &faces()]);
+    assert_contains(&refusal(&twice), &["element `face` twice"]);
+}
+
+#[test]
+fn a_path_that_is_no_file_is_refused() {
+    let directory = tempfile::tempdir().expect("temporary directory");
+    assert_contains(&refuse_path(directory.path()), &["is a directory", "help: "]);
+    let missing = directory.path().join("gone.ply");
+    assert_contains(&refuse_path(&missing), &["gone.ply: there is no such file", "help: "]);
+    assert_contains(&refusal(b""), &["is empty (0 bytes)"]);
+    assert_contains(&refuse_path(Path::new("/dev/null")), &["is not a regular file"]);
+    let none: [PathBuf; 0] = [];
+    let error = Reach::open(&none, &InputSettings::default(), &|_, _| {}).expect_err("no files");
+    assert!(matches!(error, OpenError::NoFiles));
+}
+
+#[test]
+fn something_other_than_ply_is_refused() {
+    assert_contains(&refusal(b"LASF\0\0\x01\0"), &["is not a PLY file", "`LASF"]);
+    assert_contains(&refusal(b"ply2\nformat ascii 1.0\n"), &["is not a PLY file"]);
+}
+
+#[test]
+fn a_header_without_an_end_is_refused() {
+    let whole = file(&[&vertices(), &faces()]);
+    let at = whole.windows(10).position(|w| w == b"end_header").expect("header");
+    assert_contains(&refusal(&whole[..at]), &["no line `end_header`", &format!("first {at} bytes")]);
+    let endless = [b"ply\n".to_vec(), vec![b'c'; 3 << 20]].concat();
+    assert_contains(&refusal(&endless), &["no line `end_header`", "first 1048576 bytes"]);
+}
+
+#[test]
+fn a_header_line_outside_the_grammar_is_quoted_with_its_number() {
+    let text = header(&[&vertices(), &faces()], "\n");
+    for (line, from, to) in [
+        (5, "property double x", "property quadruple x"),
+        (5, "property double x", "property x"),
+        (4, "element vertex 5", "element vertex -5"),
+        (4, "element vertex 5", "element vertex 99999999999999999999"),
+        (2, "format binary_little_endian 1.0", "format binary_middle_endian 1.0"),
+    ] {
+        let message = refusal(text.replacen(from, to, 1).as_bytes());
+        assert_contains(&message, &[&format!("header line {line} "), &format!("`{to}`")]);
+    }
+    assert_contains(&refusal(b"ply\nend_header\n"), &["header line", "format"]);
+}
+
+#[test]
+fn counts_beyond_any_file_are_refused_without_allocating() {
+    for count in [u64::from(u32::MAX), 1_000_000_000_000_000_000, u64::MAX] {
+        let mut many = vertices();
+        many.declared = Some(count);
+        assert_contains(&refusal(&file(&[&many, &faces()])), &[&format!("of {count}"), "vertex 7 "]);
+        let mut many = faces();
+        many.declared = Some(count);
+        assert_contains(&refusal(&file(&[&vertices(), &many])), &[&format!("face 4 of {count}")]);
+        let mut many = Element::new("edge").lists("list uint int ends", [vec![1.0]]);
+        many.declared = Some(count);
+        assert_contains(&refusal(&file(&[&many, &vertices(), &faces()])), &[&format!("of {count}")]);
+        let mut nothing = Element::new("nothing");
+        nothing.declared = Some(count);
+        open_bytes(&file(&[&nothing, &vertices(), &faces()])).expect("records without properties take no bytes");
+    }
+}
+
+#[test]
+fn a_list_length_beyond_the_file_is_a_truncation() {
+    let lists: Vec<Vec<f64>> = corner_lists().collect();
+    let mut bytes = file(&[&vertices(), &Element::new("face").lists("list uint int vertex_indices", lists)]);
+    let at = bytes.len() - 16;
+    bytes[at..at + 4].copy_from_slice(&u32::MAX.to_le_bytes());
+    assert_contains(&refusal(&bytes), &["face 3 of 4", "ends at byte"]);
+}
+
+#[test]
+fn other_encodings_are_refused_with_the_remedy() {
+    let text = header(&[&vertices(), &faces()], "\n");
+    for encoding in ["ascii", "binary_big_endian"] {
+        let message = refusal(text.replace("binary_little_endian", encoding).as_bytes());
+        assert_contains(
+            &message,
+            &[&format!("is {encoding} PLY"), "binary_little_endian only", "save it as binary PLY"],
+        );
+    }
+}
+
+#[test]
+fn a_survey_wider_than_any_reach_is_refused() {
+    for far in [1e6, 1e30, 1.7e308] {
+        let x: Vec<f64> = axis(0).enumerate().map(|(i, v)| if i == 4 { far } else { v - far }).collect();
+        let vertices =
+            Element::new("vertex").numbers("double x", x).numbers("double y", axis(1)).numbers("double z", axis(2));
+        assert_contains(&refusal(&file(&[&vertices, &faces()])), &["along x", "--unit mm"]);
+    }
+}
