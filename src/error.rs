@@ -1,0 +1,74 @@
+//! What can end a run, and how the process then exits.
+
+use crate::index::IndexError;
+use crate::open::OpenError;
+use crate::pipeline::{Interrupted, LostJob};
+use crate::settings::SettingsError;
+use crate::statistics::RasterError;
+use crate::write::WriteError;
+
+/// Why a run ended without a result.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The settings cannot be used.
+    #[error(transparent)]
+    Settings(#[from] SettingsError),
+    /// An input cannot be read.
+    #[error(transparent)]
+    Open(#[from] OpenError),
+    /// The survey cannot be indexed.
+    #[error(transparent)]
+    Index(#[from] IndexError),
+    /// The raster cannot be made.
+    #[error(transparent)]
+    Raster(#[from] RasterError),
+    /// A result cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// Somebody pressed Ctrl-C.
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
+    /// A tile of a pass on which all others depend panicked.
+    #[error("tile {} of the {pass} pass failed: {}\nhelp: this is a bug; please report it with the input's header and run.json", lost.job, lost.message)]
+    TileFailed {
+        /// The pass.
+        pass: &'static str,
+        /// The tile and what it said.
+        lost: LostJob,
+    },
+    /// The compute threads could not be started.
+    #[error("cannot start {threads} compute threads: {source}\nhelp: ask for fewer with --threads")]
+    Threads {
+        /// How many were asked for.
+        threads: usize,
+        /// Why.
+        source: rayon::ThreadPoolBuildError,
+    },
+}
+
+/// How the process exits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ExitCode {
+    /// Everything was done.
+    Done = 0,
+    /// The run failed; older outputs are untouched.
+    Failed = 1,
+    /// The command line or the settings cannot be used.
+    Usage = 2,
+    /// The outputs are complete but for tiles that failed, which `run.json` names.
+    DoneWithLosses = 3,
+    /// Ctrl-C or a termination signal.
+    Interrupted = 130,
+}
+
+impl Error {
+    /// The exit code that fits.
+    pub fn exit_code(&self) -> ExitCode {
+        match self {
+            Error::Settings(_) => ExitCode::Usage,
+            Error::Interrupted(_) => ExitCode::Interrupted,
+            _ => ExitCode::Failed,
+        }
+    }
+}

@@ -1,0 +1,217 @@
+//! The page that shows the river: from files to files.
+
+use crate::curvature::Stencil;
+use crate::error::Error;
+use crate::index::Index;
+use crate::measure::Wanted;
+use crate::open::Reach;
+use crate::passes::{Pass, Recipe, Survey};
+use crate::pipeline::{Budget, Control, Crew, LostJob, memory_there_bytes};
+use crate::progress::{Progress, Unit};
+use crate::segment::smallest_grain_area_m2;
+use crate::settings::Settings;
+use crate::stitch::{TileReport, stitch};
+use crate::tile::Plan;
+use crate::write::{OutputFolder, Results, write_all};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// What to run.
+#[derive(Debug, Clone)]
+pub struct Job {
+    /// Files of one survey.
+    pub inputs: Vec<PathBuf>,
+    /// Folder for the results.
+    pub out: PathBuf,
+    /// Every parameter.
+    pub settings: Settings,
+    /// Whether results that are there may be replaced.
+    pub force: bool,
+}
+
+/// What a run did.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    /// The files written.
+    pub files: Vec<PathBuf>,
+    /// Number of grains.
+    pub grains: u64,
+    /// Number of bodies wider than `max_grain_m`.
+    pub oversize: u64,
+    /// Tiles whose grains are missing.
+    pub lost: Vec<LostJob>,
+    /// Triangles segmented for each triangle of the survey: what halos cost.
+    pub segmented_per_triangle: f64,
+}
+
+/// Runs a job: opens the survey, works it tile by tile, and writes the results.
+///
+/// The result does not depend on `settings.work`: neither on the tile size, nor on the threads, nor on the
+/// memory. Nothing is written under its final name before everything is complete.
+///
+/// # Errors
+/// Whatever keeps the results from being complete; see [`Error`].
+pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outcome, Error> {
+    let settings = &job.settings;
+    settings.check()?;
+    let folder = OutputFolder::create(&job.out, job.force, &[])?;
+    let crew = crew(settings, control)?;
+
+    // open
+    let (reach, warnings) = open(job, progress)?;
+    let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+    warnings.iter().for_each(|w| progress.warn(w));
+
+    // index
+    progress.begin("index", reach.triangles(), Unit::Triangles);
+    let mut index = crew.pool.install(|| Index::build(&reach))?;
+    progress.advance(reach.triangles());
+    progress.end();
+
+    // plan
+    let plan = plan(&index, settings, &crew);
+    progress.note(&format!(
+        "{} tiles of {:.3} m, {} threads, {} MiB of memory for tiles",
+        plan.tiles.len(),
+        plan.tile_size_m,
+        crew.pool.current_num_threads(),
+        crew.budget.total_bytes() >> 20
+    ));
+    let survey = |index| Survey { surface: &reach, index, plan: &plan };
+
+    // tile by tile: spacing, curvature, then segment and measure
+    let spacing_m = whole("spacing", survey(&index).spacing(&crew, progress)?)?;
+    index.scale.spacing_m = spacing_m;
+    let stencil = Stencil::new(spacing_m, index.scale.mean_triangle_area_m2, &settings.curvature);
+    let divergence = whole("curvature", survey(&index).divergence(&crew, &stencil, progress)?)?;
+    let outline_step_m = reach.frame().outline_step_m();
+    let wanted = Wanted { outline_step_m, triangle_ids: settings.output.labelled_mesh };
+    let recipe = Recipe { settings: &settings.segment, divergence: &divergence, wanted };
+    let found = survey(&index).grains(&crew, &recipe, progress)?;
+    found.lost.iter().for_each(|lost| progress.warn(&format!("tile {} is lost: {}", lost.job, lost.message)));
+
+    // stitch
+    let touch_steps = (TOUCH_EDGES * index.scale.mean_edge_m / outline_step_m) as i64;
+    let (catalogue, tiles) = stitch(found.result, touch_steps);
+
+    // statistics and write
+    let facts = facts(&reach, &index, &plan, &warnings, &found.lost);
+    let results = Results {
+        frame: reach.frame(),
+        settings,
+        scale: &index.scale,
+        catalogue: &catalogue,
+        tiles: &tiles,
+        smallest_grain_area_m2: smallest_grain_area_m2(&index.scale, &settings.segment),
+        facts: &facts,
+        mesh: settings.output.labelled_mesh.then_some(&reach),
+    };
+    let files = write(&folder, &results, progress)?;
+    Ok(Outcome {
+        files,
+        grains: catalogue.grains.len() as u64,
+        oversize: catalogue.oversize.len() as u64,
+        lost: found.lost,
+        segmented_per_triangle: segmented_per_triangle(&tiles),
+    })
+}
+
+/// Outlines within this many mean edges touch: grains are separated by a valley of a few triangles.
+const TOUCH_EDGES: f64 = 4.0;
+/// Share of the memory that is there for tiles in flight, unless a budget is set.
+const SHARE_OF_MEMORY: f64 = 0.5;
+/// Budget where the system does not tell what is there, bytes.
+const MEMORY_IF_UNKNOWN: u64 = 2 << 30;
+
+fn crew(settings: &Settings, control: &Control) -> Result<Crew, Error> {
+    let threads = settings.work.threads;
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .thread_name(|i| format!("worker-{i}"))
+        .build()
+        .map_err(|source| Error::Threads { threads, source })?;
+    let bytes = settings.memory_bytes().unwrap_or_else(|| {
+        memory_there_bytes().map_or(MEMORY_IF_UNKNOWN, |there| (there as f64 * SHARE_OF_MEMORY) as u64)
+    });
+    Ok(Crew { pool, budget: Budget::new(bytes), control: control.clone() })
+}
+
+fn open(job: &Job, progress: &dyn Progress) -> Result<(Reach, Vec<crate::open::Warning>), Error> {
+    let bytes: u64 = job.inputs.iter().filter_map(|p| std::fs::metadata(p).ok()).map(|m| m.len()).sum();
+    progress.begin("open", bytes, Unit::Bytes);
+    let told = AtomicU64::new(0);
+    let opened = Reach::open(&job.inputs, &job.settings.input, &|done, _| {
+        let before = told.fetch_max(done, Ordering::Relaxed);
+        progress.advance(done.saturating_sub(before));
+    });
+    progress.end();
+    Ok(opened?)
+}
+
+fn plan(index: &Index, settings: &Settings, crew: &Crew) -> Plan {
+    let tile_size_m = if settings.work.tile_size_m > 0.0 {
+        settings.work.tile_size_m
+    } else {
+        let halo_m = settings.segment.max_grain_m;
+        Plan::size_for_budget(index, halo_m, crew.budget.total_bytes(), crew.pool.current_num_threads())
+    };
+    Plan::new(index, tile_size_m)
+}
+
+/// A pass on which everything depends: none of its tiles may be lost.
+fn whole<T>(name: &'static str, pass: Pass<T>) -> Result<T, Error> {
+    match pass.lost.into_iter().next() {
+        Some(lost) => Err(Error::TileFailed { pass: name, lost }),
+        None => Ok(pass.result),
+    }
+}
+
+fn write(folder: &OutputFolder, results: &Results, progress: &dyn Progress) -> Result<Vec<PathBuf>, Error> {
+    progress.begin("write", crate::write::OUTPUTS.len() as u64, Unit::Files);
+    let written = write_all(folder, results, &|_| progress.advance(1));
+    progress.end();
+    Ok(written?)
+}
+
+fn segmented_per_triangle(tiles: &[TileReport]) -> f64 {
+    let (loaded, owned) =
+        tiles.iter().fold((0, 0), |(l, o), t| (l + t.loaded_triangles, o + t.core_triangles));
+    loaded as f64 / owned.max(1) as f64
+}
+
+/// What else belongs into `run.json`.
+fn facts(reach: &Reach, index: &Index, plan: &Plan, warnings: &[String], lost: &[LostJob]) -> serde_json::Value {
+    let absolute = |p: &Path| std::path::absolute(p).unwrap_or_else(|_| p.to_owned()).display().to_string();
+    let inputs: Vec<_> = reach
+        .files()
+        .iter()
+        .map(|f| {
+            serde_json::json!({
+                "path": absolute(&f.path),
+                "bytes": f.bytes(),
+                "vertices": f.vertices(),
+                "faces": f.faces(),
+                "triangles": f.triangles(),
+                "fingerprint": f.fingerprint(),
+            })
+        })
+        .collect();
+    let lost: Vec<_> = lost
+        .iter()
+        .map(|l| {
+            let core = index.grid.outline(&plan.tiles[l.job].core);
+            serde_json::json!({ "tile": plan.tiles[l.job].id, "core_min_m": core.min, "core_max_m": core.max, "message": l.message })
+        })
+        .collect();
+    serde_json::json!({
+        "inputs": inputs,
+        "warnings": warnings,
+        "lost_tiles": lost,
+        "tiles": plan.tiles.len(),
+        "tile_size_m": plan.tile_size_m,
+        "mean_edge_m": index.scale.mean_edge_m,
+        "mean_triangle_area_m2": index.scale.mean_triangle_area_m2,
+        "spacing_m": index.scale.spacing_m,
+        "zero_area_triangles": index.scale.zero_area_triangles,
+    })
+}
