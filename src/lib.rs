@@ -17,3 +17,5 @@ pub mod index;
 pub mod measure;
 pub mod open;
 pub mod stitch;
+pub mod statistics;
+pub mod write;

@@ -1,5 +1,7 @@
 //! Measuring: one whole segment becomes a [`Grain`].
 
+pub mod attitude;
 mod grain;
+pub mod shape;
 
 pub use grain::{Grain, Polygon};
