@@ -16,6 +16,6 @@ pub mod settings;
 pub mod index;
 pub mod measure;
 pub mod open;
-pub mod stitch;
 pub mod statistics;
+pub mod stitch;
 pub mod write;

@@ -48,8 +48,7 @@ impl Attitude {
     /// The attitude of unit axes a, b, c.
     pub fn of([a, b, c]: [DVec3; 3]) -> Attitude {
         let level = a.x.hypot(a.y);
-        let (yaw, roll) =
-            if level < VERTICAL { ((-b.x).atan2(b.y), 0.0) } else { (a.y.atan2(a.x), b.z.atan2(c.z)) };
+        let (yaw, roll) = if level < VERTICAL { ((-b.x).atan2(b.y), 0.0) } else { (a.y.atan2(a.x), b.z.atan2(c.z)) };
         let down = if a.z > 0.0 { -a } else { a };
         let trend = azimuth_deg(down).map(|t| if a.z == 0.0 && t >= 180.0 { t - 180.0 } else { t });
         let up = if c.z < 0.0 { -c } else { c };
@@ -167,7 +166,8 @@ mod tests {
         let at = Attitude::of([a, b, c]);
         assert_eq!(at.a_trend_deg, None);
         near(at.a_plunge_deg, 90.0);
-        let rebuilt = DMat3::from_rotation_z(at.yaw_deg.to_radians()) * DMat3::from_rotation_y(at.pitch_deg.to_radians());
+        let rebuilt =
+            DMat3::from_rotation_z(at.yaw_deg.to_radians()) * DMat3::from_rotation_y(at.pitch_deg.to_radians());
         assert!(rebuilt.abs_diff_eq(DMat3::from_cols(a, b, c), 1e-12));
     }
 }

@@ -94,7 +94,15 @@ impl RasterGrid {
             let enough_m = ((max[0] - min[0]) * (max[1] - min[1]) / MOST_CELLS as f64).sqrt() * 1.1;
             let enough_m = enough_m.max((max[0] - min[0]).max(max[1] - min[1]) / (MOST_CELLS as f64 / 4.0));
             let (width_m, height_m) = (max[0] - min[0], max[1] - min[1]);
-            return Err(RasterError::TooManyCells { cell_m, width_m, height_m, columns, rows, most: MOST_CELLS, enough_m });
+            return Err(RasterError::TooManyCells {
+                cell_m,
+                width_m,
+                height_m,
+                columns,
+                rows,
+                most: MOST_CELLS,
+                enough_m,
+            });
         }
         let cell = cell as i64;
         let origin = frame.origin_map();

@@ -145,10 +145,7 @@ impl BAxis {
             d90_m: percentile(90.0),
             d95_m: percentile(95.0),
             mean_m,
-            sorting_sqrt_d84_over_d16: d84_m
-                .zip(d16_m)
-                .map(|(d84, d16)| (d84 / d16).sqrt())
-                .filter(|s| s.is_finite()),
+            sorting_sqrt_d84_over_d16: d84_m.zip(d16_m).map(|(d84, d16)| (d84 / d16).sqrt()).filter(|s| s.is_finite()),
         }
     }
 }
