@@ -95,7 +95,7 @@ impl Summary {
         let m = &settings.measure;
         let equant = |g: &NumberedGrain| near_equant(g.grain.axes_m, m) != (false, false);
         let few = |g: &NumberedGrain| g.grain.triangles < m.few_triangles;
-        let footprint = grains.iter().map(|g| g.grain.footprint_area_m2).sum::<f64>();
+        let footprint = grains.iter().map(|g| g.grain.footprint_area_m2).fold(0.0, |sum, area| sum + area);
         let size = scale.max - scale.min;
         let box_area = size.x * size.y;
         Summary {

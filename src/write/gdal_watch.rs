@@ -46,7 +46,45 @@ impl Watch {
 
 fn note(class: CplErrType, message: &str) {
     match class {
-        CplErrType::Failure | CplErrType::Fatal => FAILURES.with_borrow_mut(|f| f.push(message.to_owned())),
+        CplErrType::Failure | CplErrType::Fatal => FAILURES.with_borrow_mut(|f| f.push(abridged(message))),
         _ => tracing::debug!("GDAL: {message}"),
+    }
+}
+
+/// GDAL quotes whole SQL statements and gives the reason at the end: the middle goes.
+fn abridged(message: &str) -> String {
+    const ENDS: usize = 90;
+    let characters = message.chars().count();
+    if characters <= 2 * ENDS + 10 {
+        return message.to_owned();
+    }
+    let start: String = message.chars().take(ENDS).collect();
+    let end: String = message.chars().skip(characters - ENDS).collect();
+    format!("{start} [...] {end}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failure_that_a_call_survives_is_still_reported() {
+        let watch = Watch::new(Path::new("grains.gpkg"));
+        let opened = gdal::Dataset::open_ex(
+            "/nowhere/at/all",
+            gdal::DatasetOptions { open_flags: gdal::GdalOpenFlags::GDAL_OF_VERBOSE_ERROR, ..Default::default() },
+        );
+        assert!(opened.is_err());
+        let error = watch.step(|| "a step".into(), Ok(())).expect_err("the noted failure").to_string();
+        assert!(error.starts_with("grains.gpkg: a step failed: /nowhere/at/all"), "{error}");
+        assert!(watch.step(|| "the next step".into(), Ok(())).is_ok());
+    }
+
+    #[test]
+    fn a_long_message_keeps_its_reason() {
+        let long = format!("sqlite3_exec(CREATE TABLE {}) failed: disk is full", "x".repeat(1000));
+        let short = abridged(&long);
+        assert!(short.starts_with("sqlite3_exec(CREATE TABLE") && short.ends_with("failed: disk is full"), "{short}");
+        assert!(short.len() < 250);
     }
 }

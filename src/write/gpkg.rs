@@ -11,6 +11,26 @@ use gdal::spatial_ref::{AxisMappingStrategy, SpatialRef};
 use gdal::vector::{FieldDefn, Geometry, LayerAccess, LayerOptions, OGRFieldType, OGRwkbGeometryType};
 use gdal::{Dataset, DatasetOptions, DriverManager, GdalOpenFlags};
 
+/// The format wants a time of last change. While this lives GDAL writes a fixed one, so that equal runs
+/// give equal files.
+struct FixedDate;
+
+impl FixedDate {
+    const OPTION: &'static str = "OGR_CURRENT_DATE";
+
+    fn set() -> GdalResult<FixedDate> {
+        gdal::config::set_thread_local_config_option(Self::OPTION, "1970-01-01T00:00:00.000Z")?;
+        Ok(FixedDate)
+    }
+}
+
+impl Drop for FixedDate {
+    fn drop(&mut self) {
+        // Fails for a name with a NUL byte only, and this one has none.
+        let _ = gdal::config::clear_thread_local_config_option(Self::OPTION);
+    }
+}
+
 /// How many rows a layer must have.
 struct Expected {
     layer: &'static str,
@@ -27,21 +47,32 @@ pub(crate) fn spatial_ref(frame: &Frame) -> GdalResult<Option<SpatialRef>> {
     Ok(Some(srs))
 }
 
+/// The map's system, or without one a plane with the map's unit: a GeoPackage layer without any system is
+/// taken for degrees by its readers.
+fn system_of_layers(frame: &Frame) -> GdalResult<SpatialRef> {
+    if let Some(srs) = spatial_ref(frame)? {
+        return Ok(srs);
+    }
+    let metres = frame.metres_per_map_unit;
+    let unit = if metres == 1.0 { "metre" } else { "map unit" };
+    SpatialRef::from_wkt(&format!(
+        "LOCAL_CS[\"Undefined Cartesian SRS\",UNIT[\"{unit}\",{metres}],AXIS[\"Easting\",EAST],AXIS[\"Northing\",NORTH]]"
+    ))
+}
+
 /// Writes the file in one transaction, adds the spatial indices, and reads it back.
 pub(crate) fn write(file: &Pending, results: &Results) -> Result<(), WriteError> {
     let watch = Watch::new(&file.target);
     let step = |text: &'static str| move || text.to_owned();
-    // Files of two equal runs are equal: the format wants a time of last change, and gets a fixed one.
-    let fixed = gdal::config::set_thread_local_config_option("OGR_CURRENT_DATE", "1970-01-01T00:00:00.000Z");
-    watch.step(step("setting up GDAL"), fixed)?;
-    let srs = watch.step(step("reading the coordinate reference system"), spatial_ref(results.frame))?;
+    let _date = watch.step(step("setting up GDAL"), FixedDate::set())?;
+    let srs = watch.step(step("reading the coordinate reference system"), system_of_layers(results.frame))?;
     let created = DriverManager::get_driver_by_name("GPKG").and_then(|d| d.create_vector_only(&file.partial));
     let mut dataset = watch.step(step("creating the GeoPackage"), created)?;
     let mut expected = Vec::new();
     {
         let mut transaction = watch.step(step("starting the transaction"), dataset.start_transaction())?;
         for layer in layers::all(results) {
-            expected.push(write_layer(&watch, &mut transaction, srs.as_ref(), layer)?);
+            expected.push(write_layer(&watch, &mut transaction, &srs, layer)?);
         }
         watch.step(step("committing the layers"), transaction.commit())?;
     }
@@ -55,15 +86,13 @@ pub(crate) fn write(file: &Pending, results: &Results) -> Result<(), WriteError>
         }
     }
     watch.step(step("closing the GeoPackage"), dataset.close())?;
-    let cleared = gdal::config::clear_thread_local_config_option("OGR_CURRENT_DATE");
-    watch.step(step("setting up GDAL"), cleared)?;
     verify(file, &watch, &expected)
 }
 
 fn write_layer(
     watch: &Watch,
     dataset: &mut Dataset,
-    srs: Option<&SpatialRef>,
+    srs: &SpatialRef,
     layer: Layer<'_>,
 ) -> Result<Expected, WriteError> {
     let description = format!("DESCRIPTION={}", layer.description);
@@ -71,7 +100,7 @@ fn write_layer(
     let spatial = layer.geometry != OGRwkbGeometryType::wkbNone;
     let created = dataset.create_layer(LayerOptions {
         name: layer.name,
-        srs: srs.filter(|_| spatial),
+        srs: Some(srs).filter(|_| spatial),
         ty: layer.geometry,
         options: Some(&options),
     });

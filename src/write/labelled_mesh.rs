@@ -42,7 +42,7 @@ pub(crate) fn write(file: &Pending, results: &Results, mesh: &dyn MeshSource) ->
     let triangles = triangle_labels(results, mesh)?;
     let mut vertices = labels(mesh.vertices(), "vertices")?;
     let mut most_corners = 0;
-    each_face(mesh, &triangles, &mut |_, corners, label| {
+    each_face(mesh, &triangles, |corners, label| {
         most_corners = most_corners.max(corners.len());
         for &corner in corners {
             let of_vertex = &mut vertices[corner as usize];
@@ -65,7 +65,7 @@ pub(crate) fn write(file: &Pending, results: &Results, mesh: &dyn MeshSource) ->
         record.extend(vertices[vertex as usize].to_le_bytes());
         out.write_all(&record).map_err(failed)?;
     }
-    each_face(mesh, &triangles, &mut |_, corners, label| {
+    each_face(mesh, &triangles, |corners, label| {
         record.clear();
         put_face(&mut record, corners, label, most_corners);
         out.write_all(&record).map_err(failed)
@@ -112,12 +112,12 @@ fn triangle_labels(results: &Results, mesh: &dyn MeshSource) -> Result<Vec<i32>,
     Ok(of_triangle)
 }
 
-/// Calls `work` with every face: its number, its corners, and the label that most of its triangles have
+/// Calls `work` with the corners of every face and the label that most of its triangles have
 /// (the first of them in case of a tie).
 fn each_face(
     mesh: &dyn MeshSource,
     labels: &[i32],
-    work: &mut dyn FnMut(u64, &[u64], i32) -> Result<(), WriteError>,
+    mut work: impl FnMut(&[u64], i32) -> Result<(), WriteError>,
 ) -> Result<(), WriteError> {
     let (faces, vertices) = (mesh.faces(), mesh.vertices());
     let (mut corners, mut of_face) = (Vec::new(), Vec::new());
@@ -140,7 +140,7 @@ fn each_face(
             of_face.push(label);
             triangle += 1;
         }
-        work(face, &corners, most_common(&of_face))?;
+        work(&corners, most_common(&of_face))?;
     }
     Ok(())
 }
