@@ -30,8 +30,15 @@ pub mod measure;
 
 pub mod stitch;
 
+pub mod statistics;
+
+pub mod write;
+
 // What schedules it, and what stands beside it.
 pub mod pipeline;
 
+pub mod cli;
+pub mod error;
 pub mod inspect;
 pub mod passes;
+pub mod run;

@@ -12,7 +12,7 @@ use crate::segment::smallest_grain_area_m2;
 use crate::settings::Settings;
 use crate::stitch::{TileReport, stitch};
 use crate::tile::Plan;
-use crate::write::{OutputFolder, Results, write_all};
+use crate::write::{OutputFolder, Results, WholeMesh, write_all};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -77,17 +77,17 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
         crew.pool.current_num_threads(),
         crew.budget.total_bytes() >> 20
     ));
-    let survey = |index| Survey { surface: &reach, index, plan: &plan };
 
     // tile by tile: spacing, curvature, then segment and measure
-    let spacing_m = whole("spacing", survey(&index).spacing(&crew, progress)?)?;
-    index.scale.spacing_m = spacing_m;
-    let stencil = Stencil::new(spacing_m, index.scale.mean_triangle_area_m2, &settings.curvature);
-    let divergence = whole("curvature", survey(&index).divergence(&crew, &stencil, progress)?)?;
+    let spacing = Survey { surface: &reach, index: &index, plan: &plan }.spacing(&crew, progress)?;
+    index.scale.spacing_m = whole("spacing", spacing)?;
+    let survey = Survey { surface: &reach, index: &index, plan: &plan };
+    let stencil = Stencil::new(index.scale.spacing_m, index.scale.mean_triangle_area_m2, &settings.curvature);
+    let divergence = whole("curvature", survey.divergence(&crew, &stencil, progress)?)?;
     let outline_step_m = reach.frame().outline_step_m();
     let wanted = Wanted { outline_step_m, triangle_ids: settings.output.labelled_mesh };
     let recipe = Recipe { settings: &settings.segment, divergence: &divergence, wanted };
-    let found = survey(&index).grains(&crew, &recipe, progress)?;
+    let found = survey.grains(&crew, &recipe, progress)?;
     found.lost.iter().for_each(|lost| progress.warn(&format!("tile {} is lost: {}", lost.job, lost.message)));
 
     // stitch
@@ -96,6 +96,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
 
     // statistics and write
     let facts = facts(&reach, &index, &plan, &warnings, &found.lost);
+    let mesh = WholeMesh::new(&reach);
     let results = Results {
         frame: reach.frame(),
         settings,
@@ -104,7 +105,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
         tiles: &tiles,
         smallest_grain_area_m2: smallest_grain_area_m2(&index.scale, &settings.segment),
         facts: &facts,
-        mesh: settings.output.labelled_mesh.then_some(&reach),
+        mesh: settings.output.labelled_mesh.then_some(&mesh),
     };
     let files = write(&folder, &results, progress)?;
     Ok(Outcome {
@@ -187,7 +188,7 @@ fn facts(reach: &Reach, index: &Index, plan: &Plan, warnings: &[String], lost: &
         .iter()
         .map(|f| {
             serde_json::json!({
-                "path": absolute(&f.path),
+                "path": absolute(f.path()),
                 "bytes": f.bytes(),
                 "vertices": f.vertices(),
                 "faces": f.faces(),

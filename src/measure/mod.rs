@@ -1,9 +1,11 @@
 //! Measuring: one whole segment becomes a [`Grain`].
 
+pub mod attitude;
 mod axes;
 mod ellipsoid;
 mod grain;
 mod outline;
+pub mod shape;
 
 pub use axes::{Axes, axes};
 pub use ellipsoid::ellipsoid_axes;

@@ -1,0 +1,180 @@
+//! `grains.gpkg`: a GeoPackage with the grains, their centres, what was too wide, the tiles and the survey.
+
+use super::columns::{Kind, Value};
+use super::gdal_calls::{create_boolean_field, set_fid};
+use super::gdal_watch::Watch;
+use super::layers::{self, Feature, Layer};
+use super::{Results, WriteError, atomic::Pending};
+use crate::open::Frame;
+use gdal::errors::Result as GdalResult;
+use gdal::spatial_ref::{AxisMappingStrategy, SpatialRef};
+use gdal::vector::{FieldDefn, Geometry, LayerAccess, LayerOptions, OGRFieldType, OGRwkbGeometryType};
+use gdal::{Dataset, DatasetOptions, DriverManager, GdalOpenFlags};
+
+/// The format wants a time of last change. While this lives GDAL writes a fixed one, so that equal runs
+/// give equal files.
+struct FixedDate;
+
+impl FixedDate {
+    const OPTION: &'static str = "OGR_CURRENT_DATE";
+
+    fn set() -> GdalResult<FixedDate> {
+        gdal::config::set_thread_local_config_option(Self::OPTION, "1970-01-01T00:00:00.000Z")?;
+        Ok(FixedDate)
+    }
+}
+
+impl Drop for FixedDate {
+    fn drop(&mut self) {
+        // Fails for a name with a NUL byte only, and this one has none.
+        let _ = gdal::config::clear_thread_local_config_option(Self::OPTION);
+    }
+}
+
+/// How many rows a layer must have.
+struct Expected {
+    layer: &'static str,
+    features: u64,
+    /// Rows of its spatial index; none for a table without geometry.
+    shapes: Option<u64>,
+}
+
+/// The map's system with the east axis first, whatever its authority says; none without a CRS.
+pub(crate) fn spatial_ref(frame: &Frame) -> GdalResult<Option<SpatialRef>> {
+    let Some(crs) = &frame.crs else { return Ok(None) };
+    let mut srs = SpatialRef::from_wkt(&crs.wkt)?;
+    srs.set_axis_mapping_strategy(AxisMappingStrategy::TraditionalGisOrder);
+    Ok(Some(srs))
+}
+
+/// The map's system, or without one a plane with the map's unit: a GeoPackage layer without any system is
+/// taken for degrees by its readers.
+fn system_of_layers(frame: &Frame) -> GdalResult<SpatialRef> {
+    if let Some(srs) = spatial_ref(frame)? {
+        return Ok(srs);
+    }
+    let metres = frame.metres_per_map_unit;
+    let unit = if metres == 1.0 { "metre" } else { "map unit" };
+    SpatialRef::from_wkt(&format!(
+        "LOCAL_CS[\"Undefined Cartesian SRS\",UNIT[\"{unit}\",{metres}],AXIS[\"Easting\",EAST],AXIS[\"Northing\",NORTH]]"
+    ))
+}
+
+/// Writes the file in one transaction, adds the spatial indices, and reads it back.
+pub(crate) fn write(file: &Pending, results: &Results) -> Result<(), WriteError> {
+    let watch = Watch::new(&file.target);
+    let step = |text: &'static str| move || text.to_owned();
+    let _date = watch.step(step("setting up GDAL"), FixedDate::set())?;
+    let srs = watch.step(step("reading the coordinate reference system"), system_of_layers(results.frame))?;
+    let created = DriverManager::get_driver_by_name("GPKG").and_then(|d| d.create_vector_only(&file.partial));
+    let mut dataset = watch.step(step("creating the GeoPackage"), created)?;
+    let mut expected = Vec::new();
+    {
+        let mut transaction = watch.step(step("starting the transaction"), dataset.start_transaction())?;
+        for layer in layers::all(results) {
+            expected.push(write_layer(&watch, &mut transaction, &srs, layer)?);
+        }
+        watch.step(step("committing the layers"), transaction.commit())?;
+    }
+    for layer in expected.iter().filter(|l| l.shapes.is_some()) {
+        let name = layer.layer;
+        let made = number(&dataset, &format!("SELECT CreateSpatialIndex('{name}', 'geom')"));
+        let made = watch.step(|| format!("building the spatial index of layer {name}"), made)?;
+        if made != Some(1) {
+            let (path, what) = (file.target.clone(), "spatial indices");
+            return Err(WriteError::IncompleteLayer { path, layer: name.into(), what, expected: 1, found: 0 });
+        }
+    }
+    watch.step(step("closing the GeoPackage"), dataset.close())?;
+    verify(file, &watch, &expected)
+}
+
+fn write_layer(
+    watch: &Watch,
+    dataset: &mut Dataset,
+    srs: &SpatialRef,
+    layer: Layer<'_>,
+) -> Result<Expected, WriteError> {
+    let description = format!("DESCRIPTION={}", layer.description);
+    let options = ["SPATIAL_INDEX=NO", "GEOMETRY_NAME=geom", "FID=fid", &description];
+    let spatial = layer.geometry != OGRwkbGeometryType::wkbNone;
+    let created = dataset.create_layer(LayerOptions {
+        name: layer.name,
+        srs: Some(srs).filter(|_| spatial),
+        ty: layer.geometry,
+        options: Some(&options),
+    });
+    let out = watch.step(|| format!("creating layer {}", layer.name), created)?;
+    for (name, kind) in &layer.fields {
+        let made = match kind {
+            Kind::Boolean => create_boolean_field(&out, name),
+            Kind::Integer => FieldDefn::new(name, OGRFieldType::OFTInteger64).and_then(|f| f.add_to_layer(&out)),
+            Kind::Real => FieldDefn::new(name, OGRFieldType::OFTReal).and_then(|f| f.add_to_layer(&out)),
+            Kind::Text => FieldDefn::new(name, OGRFieldType::OFTString).and_then(|f| f.add_to_layer(&out)),
+        };
+        watch.step(|| format!("creating field {name} of layer {}", layer.name), made)?;
+    }
+    let (mut features, mut shapes) = (0, 0);
+    for feature in layer.features {
+        features += 1;
+        shapes += u64::from(feature.wkb.is_some());
+        let added = add_feature(&out, &feature);
+        watch.step(|| format!("writing feature {features} of layer {}", layer.name), added)?;
+    }
+    Ok(Expected { layer: layer.name, features, shapes: spatial.then_some(shapes) })
+}
+
+fn add_feature(layer: &gdal::vector::Layer, feature: &Feature) -> GdalResult<()> {
+    let mut out = gdal::vector::Feature::new(layer.defn())?;
+    if let Some(fid) = feature.fid {
+        set_fid(&mut out, i64::try_from(fid)?)?;
+    }
+    for (index, value) in feature.values.iter().enumerate() {
+        match value {
+            Value::Null => out.set_field_null(index)?,
+            Value::Integer(i) => out.set_field_integer64(index, *i)?,
+            Value::Real(r) | Value::Position(r) => out.set_field_double(index, *r)?,
+            Value::Text(t) => out.set_field_string(index, t)?,
+            Value::Boolean(b) => out.set_field_integer(index, i32::from(*b))?,
+        }
+    }
+    if let Some(wkb) = &feature.wkb {
+        out.set_geometry(Geometry::from_wkb(wkb)?)?;
+    }
+    out.create(layer)
+}
+
+/// First field of the first row of a query.
+fn number(dataset: &Dataset, query: &str) -> GdalResult<Option<i64>> {
+    let Some(mut rows) = dataset.execute_sql(query, None, gdal::vector::sql::Dialect::DEFAULT)? else {
+        return Ok(None);
+    };
+    rows.features().next().map_or(Ok(None), |row| row.field_as_integer64(0))
+}
+
+/// Opens the closed file again: before GDAL 3.7 a full disk can go unreported when a file is closed.
+fn verify(file: &Pending, watch: &Watch, expected: &[Expected]) -> Result<(), WriteError> {
+    let options = DatasetOptions {
+        open_flags: GdalOpenFlags::GDAL_OF_VECTOR | GdalOpenFlags::GDAL_OF_VERBOSE_ERROR,
+        allowed_drivers: Some(&["GPKG"]),
+        ..Default::default()
+    };
+    let opened = Dataset::open_ex(&file.partial, options);
+    let dataset = watch.step(|| "opening the finished GeoPackage".into(), opened)?;
+    for Expected { layer, features, shapes } in expected {
+        let mut counts = vec![("features", format!("SELECT COUNT(*) FROM \"{layer}\""), *features)];
+        if let Some(shapes) = shapes {
+            let query = format!("SELECT COUNT(*) FROM \"rtree_{layer}_geom\"");
+            counts.push(("rows of the spatial index", query, *shapes));
+        }
+        for (what, query, expected) in counts {
+            let found = watch.step(|| format!("counting the {what} of layer {layer}"), number(&dataset, &query))?;
+            let found = found.and_then(|n| u64::try_from(n).ok()).unwrap_or(0);
+            if found != expected {
+                let (path, layer) = (file.target.clone(), (*layer).to_owned());
+                return Err(WriteError::IncompleteLayer { path, layer, what, expected, found });
+            }
+        }
+    }
+    watch.step(|| "closing the finished GeoPackage".into(), dataset.close())
+}

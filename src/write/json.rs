@@ -1,0 +1,45 @@
+//! `summary.json` and `run.json`.
+
+use super::columns::COLUMNS;
+use super::{Results, WriteError, atomic::Pending};
+use crate::statistics::Summary;
+use serde::Serialize;
+use serde_json::json;
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+
+/// The statistics of the survey.
+pub(crate) fn write_summary(file: &Pending, summary: &Summary) -> Result<(), WriteError> {
+    write(file, summary)
+}
+
+/// What was run: program, version, settings, frame, columns, and the facts that the run hands over.
+pub(crate) fn write_run(file: &Pending, results: &Results, names: &[&str]) -> Result<(), WriteError> {
+    let frame = results.frame;
+    let report = json!({
+        "program": env!("CARGO_PKG_NAME"),
+        "version": env!("CARGO_PKG_VERSION"),
+        "settings": results.settings,
+        "facts": results.facts,
+        "frame": {
+            "crs": frame.crs.as_ref().map(|c| &c.name),
+            "authority": frame.crs.as_ref().and_then(|c| c.authority.as_ref()),
+            "offset_map_units": frame.offset_map,
+            "metres_per_map_unit": frame.metres_per_map_unit,
+            "metres_per_input_unit": frame.metres_per_input_unit,
+        },
+        "outputs": names,
+        "grain_columns": COLUMNS,
+    });
+    write(file, &report)
+}
+
+fn write(file: &Pending, value: &impl Serialize) -> Result<(), WriteError> {
+    let write = || -> io::Result<()> {
+        let mut out = BufWriter::new(File::create(&file.partial)?);
+        serde_json::to_writer_pretty(&mut out, value)?;
+        out.write_all(b"\n")?;
+        out.flush()
+    };
+    write().map_err(|source| file.error("write the report", source))
+}

@@ -1,0 +1,84 @@
+//! Writing: results become files, all of them or none.
+//!
+//! | file | content |
+//! |---|---|
+//! | `grains.gpkg` | GeoPackage: layers `grains`, `grain_centres`, `oversize`, `tiles`, `survey` |
+//! | `grains.csv` | the table of grains; the only columns are those of [`columns::COLUMNS`] |
+//! | `grain_size.tif` | Cloud-Optimised GeoTIFF of grain sizes, count and cover |
+//! | `labelled_mesh.ply` | on request: the input mesh with a `grain_id` per face and vertex |
+//! | `summary.json` | counts, areas and percentiles |
+//! | `run.json` | program, version, settings, what came in and what was refused |
+
+mod atomic;
+pub mod columns;
+mod csv;
+mod error;
+mod gdal_calls;
+mod gdal_watch;
+mod geotiff;
+mod gpkg;
+mod json;
+mod labelled_mesh;
+mod layers;
+mod source;
+mod wkb;
+
+pub use atomic::{OUTPUTS, OutputFolder};
+pub use error::WriteError;
+pub use labelled_mesh::MeshSource;
+pub use source::WholeMesh;
+
+use crate::index::Scale;
+use crate::open::Frame;
+use crate::settings::Settings;
+use crate::statistics::{GrainSizeRaster, Summary};
+use crate::stitch::{Catalogue, TileReport};
+use std::path::PathBuf;
+
+/// Everything that a run found, ready to be written.
+#[derive(Clone, Copy)]
+pub struct Results<'a> {
+    /// How local and map coordinates hang together.
+    pub frame: &'a Frame,
+    /// The settings of the run.
+    pub settings: &'a Settings,
+    /// The survey's scale.
+    pub scale: &'a Scale,
+    /// Grains and oversize bodies. For a labelled mesh the grains carry their triangles.
+    pub catalogue: &'a Catalogue,
+    /// How each tile was worked.
+    pub tiles: &'a [TileReport],
+    /// Smallest visible surface of a grain that was held against the segments, m².
+    pub smallest_grain_area_m2: f64,
+    /// What else belongs into `run.json`: input files, what was refused or lost.
+    pub facts: &'a serde_json::Value,
+    /// The input mesh, if it is to be written again with labels.
+    pub mesh: Option<&'a dyn MeshSource>,
+}
+
+/// Writes all results and returns their paths. `progress` hears the name of each file before it is written.
+///
+/// # Errors
+/// Anything that keeps a file from being complete; then none of the final names has been touched, except
+/// where renaming itself fails.
+pub fn write_all(out: &OutputFolder, results: &Results, progress: &dyn Fn(&str)) -> Result<Vec<PathBuf>, WriteError> {
+    let raster = GrainSizeRaster::new(results.catalogue, results.frame, results.scale, &results.settings.raster)?;
+    let summary = Summary::new(results.catalogue, results.settings, results.scale, results.smallest_grain_area_m2);
+    let names: Vec<&str> =
+        OUTPUTS.into_iter().filter(|&name| name != "labelled_mesh.ply" || results.mesh.is_some()).collect();
+    let mut written = Vec::with_capacity(names.len());
+    for &name in &names {
+        progress(name);
+        let file = out.begin(name)?;
+        match (name, results.mesh) {
+            ("grains.gpkg", _) => gpkg::write(&file, results)?,
+            ("grains.csv", _) => csv::write(&file, results)?,
+            ("grain_size.tif", _) => geotiff::write(&file, results, &raster, &summary)?,
+            ("labelled_mesh.ply", Some(mesh)) => labelled_mesh::write(&file, results, mesh)?,
+            ("summary.json", _) => json::write_summary(&file, &summary)?,
+            _ => json::write_run(&file, results, &names)?,
+        }
+        written.push(file);
+    }
+    out.publish(written)
+}
