@@ -17,7 +17,7 @@
 //! direction. Tilted so that a points 20 degrees down at azimuth 30: pitch 20, plunge 20, dip 20 towards 30.
 //!
 //! The program published with Rheinwalt et al. (2025) has the axes as ROWS in the same formulas, which
-//! gives the angles of the inverse rotation (yaw -60 up to the sign of an axis in the example): its three
+//! gives the angles of the inverse rotation (yaw -60 or 120 in the first example): its three
 //! angles cannot be compared with these, its axes can.
 
 use crate::geometry::DVec3;

@@ -178,3 +178,28 @@ fn verify(file: &Pending, watch: &Watch, expected: &[Expected]) -> Result<(), Wr
     }
     watch.step(|| "closing the finished GeoPackage".into(), dataset.close())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_layer_that_lost_features_or_its_index_is_named() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let file =
+            Pending { partial: folder.path().join("grains.gpkg.partial"), target: folder.path().join("grains.gpkg") };
+        let watch = Watch::new(&file.target);
+        let driver = DriverManager::get_driver_by_name("GPKG").expect("driver");
+        let mut dataset = driver.create_vector_only(&file.partial).expect("GeoPackage");
+        let options = ["SPATIAL_INDEX=NO"];
+        let layer = LayerOptions { name: "grains", options: Some(&options), ..Default::default() };
+        dataset.create_layer(layer).map(|_| ()).expect("layer");
+        dataset.close().expect("closed");
+        let expected = |features, shapes| [Expected { layer: "grains", features, shapes }];
+        let lost = verify(&file, &watch, &expected(3, None)).expect_err("three features are missing");
+        assert!(lost.to_string().contains("layer grains holds 0 features, but 3 were written"), "{lost}");
+        let bare = verify(&file, &watch, &expected(0, Some(0))).expect_err("there is no index");
+        assert!(bare.to_string().contains("rtree_grains_geom"), "{bare}");
+        verify(&file, &watch, &expected(0, None)).expect("nothing was to be written");
+    }
+}

@@ -1,5 +1,5 @@
 use crate::fixture::{Strip, Survey, new_zealand, survey};
-use gravelometer::write::{OutputFolder, WriteError, write_all};
+use gravelometer::write::{MeshSource, OutputFolder, WriteError, write_all};
 
 fn write(survey: &Survey, mesh: &Strip) -> Result<Vec<u8>, WriteError> {
     let folder = tempfile::tempdir().expect("temporary folder");
@@ -81,4 +81,47 @@ fn a_face_or_a_grain_that_refers_to_nothing_is_named() {
     assert!(matches!(error, WriteError::CornerOutOfRange { face: 0, vertex: 9, vertices: 3 }), "{error}");
     let error = write(&labelled([&[0], &[77]]), &strip()).expect_err("triangle 77");
     assert!(matches!(error, WriteError::UnknownTriangle { grain_id: 2, triangle: 77, triangles: 5 }), "{error}");
+}
+
+#[test]
+fn a_grain_number_beyond_32_bits_is_refused_in_the_mesh() {
+    let mut survey = labelled([&[0], &[1]]);
+    survey.catalogue.grains[1].grain_id = 1 << 31;
+    let error = write(&survey, &strip()).expect_err("2147483648");
+    assert!(matches!(error, WriteError::TooManyGrains { .. }), "{error}");
+}
+
+#[test]
+fn a_mesh_that_was_labelled_before_keeps_both_numbers() {
+    struct Again(Strip);
+    impl MeshSource for Again {
+        fn vertices(&self) -> u64 {
+            self.0.vertices()
+        }
+        fn faces(&self) -> u64 {
+            self.0.faces()
+        }
+        fn vertex_properties(&self) -> Vec<(String, &'static str)> {
+            vec![("x".into(), "float64"), ("y".into(), "float32"), ("grain_id".into(), "uint8")]
+        }
+        fn vertex_record(&self, v: u64, out: &mut Vec<u8>) {
+            self.0.vertex_record(v, out);
+        }
+        fn face_corners(&self, f: u64, out: &mut Vec<u64>) {
+            self.0.face_corners(f, out);
+        }
+        fn face_of(&self, triangle: u64) -> u64 {
+            self.0.face_of(triangle)
+        }
+        fn triangles(&self) -> u64 {
+            self.0.triangles()
+        }
+    }
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let out = OutputFolder::create(folder.path(), false, &[]).expect("empty folder");
+    let mesh = Again(strip());
+    write_all(&out, &labelled([&[0], &[]]).results(Some(&mesh)), &|_| ()).expect("all files");
+    let bytes = std::fs::read(folder.path().join("labelled_mesh.ply")).expect("mesh");
+    let text = String::from_utf8_lossy(&bytes[..500]);
+    assert!(text.contains("property uint8 input_grain_id\nproperty int grain_id\nelement face"), "{text}");
 }

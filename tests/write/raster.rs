@@ -130,6 +130,7 @@ fn a_raster_of_one_cell_and_one_with_overviews_are_both_cloud_optimised() {
         assert_eq!(tif.raster_size(), size);
         assert_eq!(tif.metadata_item("LAYOUT", "IMAGE_STRUCTURE").as_deref(), Some("COG"));
         assert_eq!(tif.rasterband(1).expect("band").overview_count().expect("count"), overviews);
+        assert_eq!(std::fs::read_dir(folder.path()).expect("folder").count(), 5, "nothing is left beside the results");
     }
 }
 
