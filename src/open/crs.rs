@@ -2,10 +2,9 @@
 
 use super::error::OpenError;
 use super::frame::Crs;
+use super::gdal_messages::{last_gdal_message, listen_to_gdal};
 use gdal::spatial_ref::SpatialRef;
-use std::cell::RefCell;
 use std::path::Path;
-use std::sync::Once;
 
 /// A projected or local system and its unit.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,20 +17,6 @@ pub struct GeoReference {
 
 /// Units whose published factor is a fraction that WKT rounds.
 const EXACT_UNITS_M: [f64; 3] = [1.0, 0.3048, 1200.0 / 3937.0];
-
-thread_local! {
-    static LAST_MESSAGE: RefCell<String> = const { RefCell::new(String::new()) };
-}
-
-/// Keeps GDAL from writing to the terminal; its last message goes into our errors instead.
-pub fn silence_gdal() {
-    static ONCE: Once = Once::new();
-    ONCE.call_once(|| {
-        gdal::config::set_error_handler(|_, _, message| {
-            LAST_MESSAGE.with(|last| message.clone_into(&mut last.borrow_mut()));
-        });
-    });
-}
 
 impl GeoReference {
     /// The system that a setting names: `EPSG:n`, WKT, or a file that holds one of them (`.prj`).
@@ -63,8 +48,7 @@ impl GeoReference {
 
 /// The system of a code or WKT; `None` if the text is neither. `shown` names it in errors.
 fn spatial_ref(shown: &str, definition: &str) -> Result<Option<SpatialRef>, OpenError> {
-    silence_gdal();
-    LAST_MESSAGE.with(|last| last.borrow_mut().clear());
+    listen_to_gdal();
     let is_code = definition.split_once(':').is_some_and(|(authority, code)| {
         !authority.is_empty()
             && authority.chars().all(|c| c.is_ascii_alphabetic())
@@ -80,7 +64,7 @@ fn spatial_ref(shown: &str, definition: &str) -> Result<Option<SpatialRef>, Open
         return Ok(None);
     };
     made.map(Some).map_err(|error| {
-        let message = LAST_MESSAGE.with(|last| last.borrow().clone());
+        let message = last_gdal_message();
         let message = if message.is_empty() { error.to_string() } else { message };
         let text = shorten(shown);
         if message.contains("proj.db") || message.contains("no database context") {

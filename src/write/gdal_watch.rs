@@ -1,18 +1,12 @@
 //! Nothing that GDAL reports is lost.
 //!
 //! GDAL before 3.7 closes a dataset without a result, and the crate does not look at errors that a call
-//! reports and then survives. A handler in the whole process notes every failure for the thread on which
-//! it happened; [`Watch`] asks for them after each step.
+//! reports and then survives. [`Watch`] asks for the noted failures after each step.
 
 use super::WriteError;
-use gdal::errors::{CplErrType, GdalError};
-use std::cell::RefCell;
+use crate::open::{gdal_failures, listen_to_gdal};
+use gdal::errors::GdalError;
 use std::path::{Path, PathBuf};
-use std::sync::Once;
-
-thread_local! {
-    static FAILURES: RefCell<Vec<String>> = const { RefCell::new(Vec::new()) };
-}
 
 /// Watches what GDAL does to one file, on this thread.
 pub(crate) struct Watch {
@@ -22,15 +16,13 @@ pub(crate) struct Watch {
 impl Watch {
     /// Starts watching; `path` is the file's name in messages.
     pub(crate) fn new(path: &Path) -> Watch {
-        static INSTALLED: Once = Once::new();
-        INSTALLED.call_once(|| gdal::config::set_error_handler(|class, _, message| note(class, message)));
-        FAILURES.with_borrow_mut(Vec::clear);
+        listen_to_gdal();
         Watch { path: path.to_owned() }
     }
 
     /// The value of a step, unless it failed or anything failed within it.
     pub(crate) fn step<T>(&self, step: impl FnOnce() -> String, result: Result<T, GdalError>) -> Result<T, WriteError> {
-        let failures = FAILURES.with_borrow_mut(std::mem::take);
+        let failures: Vec<String> = gdal_failures().iter().map(|m| abridged(m)).collect();
         let message = match (failures.is_empty(), &result) {
             (true, Ok(_)) => return result.map_err(|e| self.failure(step(), e.to_string())),
             (true, Err(e)) => e.to_string(),
@@ -41,13 +33,6 @@ impl Watch {
 
     fn failure(&self, step: String, message: String) -> WriteError {
         WriteError::Gdal { path: self.path.clone(), step, message }
-    }
-}
-
-fn note(class: CplErrType, message: &str) {
-    match class {
-        CplErrType::Failure | CplErrType::Fatal => FAILURES.with_borrow_mut(|f| f.push(abridged(message))),
-        _ => tracing::debug!("GDAL: {message}"),
     }
 }
 
