@@ -175,8 +175,7 @@ fn write(folder: &OutputFolder, results: &Results, progress: &dyn Progress) -> R
 }
 
 fn segmented_per_triangle(tiles: &[TileReport]) -> f64 {
-    let (loaded, owned) =
-        tiles.iter().fold((0, 0), |(l, o), t| (l + t.loaded_triangles, o + t.core_triangles));
+    let (loaded, owned) = tiles.iter().fold((0, 0), |(l, o), t| (l + t.loaded_triangles, o + t.core_triangles));
     loaded as f64 / owned.max(1) as f64
 }
 

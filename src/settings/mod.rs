@@ -1,0 +1,197 @@
+//! Every parameter of a run: its unit, default, allowed range and reason.
+//!
+//! The same keys serve the settings file (`--config`, TOML), the flags and `--set section.key=value`.
+//! `configs/default.toml` is compared with [`Settings::default`] by a test.
+
+mod load;
+
+pub use load::{PRESETS, SettingsError, parse_bytes};
+
+use serde::{Deserialize, Serialize};
+
+/// All settings of a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    /// What the input's coordinates mean.
+    pub input: InputSettings,
+    /// How curvature is computed.
+    pub curvature: CurvatureSettings,
+    /// What makes a grain.
+    pub segment: SegmentSettings,
+    /// When a measurement is flagged.
+    pub measure: MeasureSettings,
+    /// The grain-size raster.
+    pub raster: RasterSettings,
+    /// How the work is cut and how much of the machine it takes; never changes a result.
+    pub work: WorkSettings,
+    /// Which optional files are written.
+    pub output: OutputSettings,
+}
+
+/// Unit of the input's coordinates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Unit {
+    /// The unit of the CRS, metres without one.
+    #[default]
+    Auto,
+    /// Metres.
+    M,
+    /// Millimetres.
+    Mm,
+    /// International feet (0.3048 m).
+    Ft,
+}
+
+/// What the input's coordinates mean.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
+#[serde(default, deny_unknown_fields)]
+pub struct InputSettings {
+    /// Unit of the input's coordinates: `auto`, `m`, `mm`, `ft`.
+    pub unit: Unit,
+    /// Coordinate reference system: `EPSG:n`, WKT, or a file that holds WKT (`.prj`). Empty: none.
+    pub crs: String,
+    /// East, north and up shift added to the coordinates to reach the CRS, in units of the CRS.
+    pub offset: [f64; 3],
+}
+
+/// How curvature is computed (Rheinwalt et al. 2025, eq. 1 and 2).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CurvatureSettings {
+    /// Triangle normals averaged at each of the six stencil points, count, 1 to 256.
+    pub neighbours: usize,
+    /// Distance of the stencil points from the vertex, in mean vertex-to-nearest-triangle distances.
+    pub stencil_spacings: f64,
+}
+
+impl Default for CurvatureSettings {
+    fn default() -> Self {
+        CurvatureSettings { neighbours: 25, stencil_spacings: 2.0 }
+    }
+}
+
+/// How the smallest grain is counted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum AreaRule {
+    /// Summed triangle area, m²: the same stone passes whatever the mesh density.
+    #[default]
+    Area,
+    /// Number of triangles, the area divided by the survey's mean triangle area (the authors' program).
+    TriangleCount,
+}
+
+/// How the three vertices of a triangle decide that it is concave.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum ConcaveRule {
+    /// One concave vertex is enough (the authors' program).
+    #[default]
+    Min,
+    /// The mean of the three (the paper's text).
+    Mean,
+}
+
+/// What makes a grain.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SegmentSettings {
+    /// Widest grain, metres (longer side of its box in plan); 0 for no limit. Wider bodies are reported
+    /// as oversize, never as grains. Decides how far a tile must look beyond its core.
+    pub max_grain_m: f64,
+    /// Smallest grain, m² of visible surface.
+    pub min_grain_area_m2: f64,
+    /// Smallest grain, triangles: raises `min_grain_area_m2` on coarse meshes to this many mean triangles.
+    pub min_grain_triangles: f64,
+    /// Whether the two limits above are held against areas or against triangle counts.
+    pub area_rule: AreaRule,
+    /// How three vertices decide that a triangle is concave.
+    pub concave_rule: ConcaveRule,
+    /// Divergence below which the surface is concave, in 1 per mean edge length; 0 as published.
+    pub concave_below: f64,
+    /// Triangles taller than this are removed, metres; 0 for none.
+    pub max_triangle_height_m: f64,
+    /// Rings of triangles taken off before grains are told apart; 0 for none.
+    pub erosion_iterations: u32,
+    /// Convex-hull sphericity below which a body is no grain, 0 to 1; 0 for none.
+    pub min_sphericity: f64,
+    /// Rings of triangles given back afterwards; 0 for none.
+    pub dilation_iterations: u32,
+    /// Whether a concave pocket that touches one grain only is filled.
+    pub fill_holes: bool,
+    /// Whether such a pocket is filled even where it is open at an edge of the mesh.
+    pub fill_edge_holes: bool,
+}
+
+impl Default for SegmentSettings {
+    fn default() -> Self {
+        SegmentSettings {
+            max_grain_m: 2.0,
+            min_grain_area_m2: 1e-4,
+            min_grain_triangles: 50.0,
+            area_rule: AreaRule::Area,
+            concave_rule: ConcaveRule::Min,
+            concave_below: -0.05,
+            max_triangle_height_m: 0.0,
+            erosion_iterations: 1,
+            min_sphericity: 0.5,
+            dilation_iterations: 3,
+            fill_holes: true,
+            fill_edge_holes: false,
+        }
+    }
+}
+
+/// When a measurement is flagged.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct MeasureSettings {
+    /// Grains of fewer triangles are flagged `few_triangles`.
+    pub few_triangles: u64,
+    /// Axis ratio (a/b or b/c) below which the attitude is flagged as undefined.
+    pub equant_ratio: f64,
+}
+
+impl Default for MeasureSettings {
+    fn default() -> Self {
+        MeasureSettings { few_triangles: 100, equant_ratio: 1.1 }
+    }
+}
+
+/// The grain-size raster.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RasterSettings {
+    /// Cell size, metres; 0 for ten times the D50, rounded up to 1, 2 or 5 times a power of ten.
+    pub cell_m: f64,
+    /// Cells with fewer grains carry no percentiles.
+    pub min_grains: u32,
+}
+
+impl Default for RasterSettings {
+    fn default() -> Self {
+        RasterSettings { cell_m: 0.0, min_grains: 5 }
+    }
+}
+
+/// How the work is cut and how much of the machine it takes; never changes a result.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
+#[serde(default, deny_unknown_fields)]
+pub struct WorkSettings {
+    /// Side of a tile's core, metres; 0 to choose it from the memory budget.
+    pub tile_size_m: f64,
+    /// Compute threads; 0 for all cores.
+    pub threads: usize,
+    /// Memory for tiles in flight, as `2GiB`, `500MB` or bytes; empty for half of what is there.
+    pub memory: String,
+}
+
+/// Which optional files are written.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
+#[serde(default, deny_unknown_fields)]
+pub struct OutputSettings {
+    /// Whether the input mesh is written again with a `grain_id` for each face.
+    pub labelled_mesh: bool,
+}
