@@ -182,6 +182,121 @@ fn assign(table: &mut toml::Table, assignment: &str) -> Result<(), SettingsError
 
 /// Bytes of a size such as `2GiB`, `500MB`, `1000000`; `Some(0)` for the empty text.
 pub fn parse_bytes(text: &str) -> Option<u64> {
+    let text = read(path)?;
+            let parsed: Settings = toml::from_str(&text)
+                .map_err(|e| SettingsError::Parse { origin: origin.clone(), message: e.to_string() })?;
+            drop(parsed);
+            table =
+                text.parse().map_err(|e: toml::de::Error| SettingsError::Parse { origin, message: e.to_string() })?;
+        }
+        for assignment in assignments {
+            assign(&mut table, assignment)?;
+        }
+        let settings: Settings = table.try_into().map_err(|e: toml::de::Error| SettingsError::Parse {
+            origin: if assignments.is_empty() {
+                "settings".into()
+            } else {
+                format!("--set {}", assignments.join(" --set "))
+            },
+            message: e.to_string(),
+        })?;
+        settings.check()?;
+        Ok(settings)
+    }
+
+    /// Checks every value against its range.
+    ///
+    /// # Errors
+    /// The first value out of range, by its dotted key.
+    pub fn check(&self) -> Result<(), SettingsError> {
+        let s = &self.segment;
+        let not_negative = "must be a finite number, 0 or more";
+        for (key, value) in [
+            ("segment.max_grain_m", s.max_grain_m),
+            ("segment.min_grain_area_m2", s.min_grain_area_m2),
+            ("segment.min_grain_triangles", s.min_grain_triangles),
+            ("segment.max_triangle_height_m", s.max_triangle_height_m),
+            ("raster.cell_m", self.raster.cell_m),
+            ("work.tile_size_m", self.work.tile_size_m),
+        ] {
+            range(key, value, value.is_finite() && value >= 0.0, not_negative)?;
+        }
+        range("segment.concave_below", s.concave_below, s.concave_below.is_finite(), "must be a finite number")?;
+        range(
+            "segment.min_sphericity",
+            s.min_sphericity,
+            (0.0..=1.0).contains(&s.min_sphericity),
+            "must lie in 0 to 1",
+        )?;
+        range(
+            "segment.erosion_iterations",
+            s.erosion_iterations,
+            s.erosion_iterations <= 1000,
+            "must be at most 1000 rings",
+        )?;
+        range(
+            "segment.dilation_iterations",
+            s.dilation_iterations,
+            s.dilation_iterations <= 1000,
+            "must be at most 1000 rings",
+        )?;
+        let c = &self.curvature;
+        range("curvature.neighbours", c.neighbours, (1..=256).contains(&c.neighbours), "must lie in 1 to 256")?;
+        range(
+            "curvature.stencil_spacings",
+            c.stencil_spacings,
+            c.stencil_spacings.is_finite() && c.stencil_spacings > 0.0,
+            "must be a finite number above 0",
+        )?;
+        let ratio = self.measure.equant_ratio;
+        range("measure.equant_ratio", ratio, ratio.is_finite() && ratio >= 1.0, "must be a finite number, 1 or more")?;
+        range("work.threads", self.work.threads, self.work.threads <= 4096, "must be at most 4096")?;
+        range(
+            "work.memory",
+            &self.work.memory,
+            parse_bytes(&self.work.memory).is_some(),
+            "must be a size like 2GiB, 500MB or 1000000",
+        )?;
+        let offset = self.input.offset;
+        range(
+            "input.offset",
+            format!("{offset:?}"),
+            offset.iter().all(|v| v.is_finite() && v.abs() < 1e9),
+            "must be three finite numbers below 1e9",
+        )
+    }
+
+    /// The memory budget in bytes, if one was set.
+    pub fn memory_bytes(&self) -> Option<u64> {
+        parse_bytes(&self.work.memory).filter(|&b| b > 0)
+    }
+}
+
+fn range(key: &'static str, value: impl ToString, ok: bool, rule: &'static str) -> Result<(), SettingsError> {
+    if ok { Ok(()) } else { Err(SettingsError::Range { key, value: value.to_string(), rule }) }
+}
+
+/// Sets one dotted key; the value is read as TOML, and as a plain string where that fails.
+fn assign(table: &mut toml::Table, assignment: &str) -> Result<(), SettingsError> {
+    let bad = |message: &str| SettingsError::Parse { origin: format!("--set {assignment}"), message: message.into() };
+    let (key, text) = assignment.split_once('=').ok_or_else(|| bad("expected section.key=value"))?;
+    let (section, name) = key.trim().split_once('.').ok_or_else(|| bad("expected section.key=value"))?;
+    let value = format!("v = {text}")
+        .parse::<toml::Table>()
+        .ok()
+        .and_then(|mut t| t.remove("v"))
+        .unwrap_or_else(|| toml::Value::String(text.trim().to_owned()));
+    table
+        .entry(section.trim())
+        .or_insert_with(|| toml::Value::Table(toml::Table::new()))
+        .as_table_mut()
+        .ok_or_else(|| bad("is not a section"))?
+        .insert(name.trim().to_owned(), value);
+    Ok(())
+}
+
+/// Bytes of a size such as `2GiB`, `500MB`, `1000000`; `Some(0)` for the empty text.
+pub fn parse_bytes(text: &str) -> Option<u64> {
     let text = text.trim();
     if text.is_empty() {
         return Some(0);

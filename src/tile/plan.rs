@@ -44,15 +44,20 @@ impl Plan {
 
     /// The side of a core that lets `workers` tiles with halos of `halo_m` fit `budget_bytes`, metres.
     ///
-    /// Cores need not be smaller than a million triangles: smaller ones only repeat more halo.
+    /// A survey that fits, and is small, is one tile. Otherwise cores need not be larger than a few million
+    /// triangles, nor narrower than the halo: narrower ones repeat more than they save.
     pub fn size_for_budget(index: &Index, halo_m: f64, budget_bytes: u64, workers: usize) -> f64 {
-        const SMALLEST_CORE: f64 = 1e6;
+        const LARGEST_CORE: f64 = 4e6;
         let CellGrid { cell_m, columns, rows, .. } = index.grid;
-        let whole = f64::from(columns.max(rows)) * cell_m;
+        let whole_m = f64::from(columns.max(rows)) * cell_m;
         let in_flight = (workers + 2) as f64;
         let loaded = budget_bytes as f64 / in_flight / super::mesh::BYTES_PER_TRIANGLE as f64;
-        let per_m2 = index.scale.triangles as f64 / (f64::from(columns) * f64::from(rows) * cell_m * cell_m);
-        let side = (loaded / per_m2).sqrt() - 2.0 * halo_m;
-        side.min((4.0 * SMALLEST_CORE / per_m2).sqrt()).min(whole).max(cell_m)
+        let triangles = index.scale.triangles as f64;
+        if triangles <= loaded.min(LARGEST_CORE) {
+            return whole_m;
+        }
+        let per_m2 = triangles / (f64::from(columns) * f64::from(rows) * cell_m * cell_m);
+        let side = ((loaded / per_m2).sqrt() - 2.0 * halo_m).min((LARGEST_CORE / per_m2).sqrt());
+        side.max(halo_m).clamp(cell_m, whole_m)
     }
 }
