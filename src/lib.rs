@@ -10,6 +10,7 @@
 //! [`run`] is the page that shows all of it. A stage may use the stages above it, never those below;
 //! [`pipeline`] schedules tiles and knows no geometry.
 
+pub mod demo;
 pub mod geometry;
 pub mod settings;
 
