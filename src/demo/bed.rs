@@ -27,7 +27,7 @@ impl Sand {
         // Ripples run across a flow towards x, and their crests wander.
         let phase = (x + 0.3 * y + 0.02 * octave(11, 0.12)) / 0.085;
         let ripple = 0.0016 * (std::f64::consts::TAU * phase).sin();
-        ripple + 0.005 * octave(12, 0.2) + 0.0006 * octave(13, 0.018) + 0.00022 * octave(14, 0.0045)
+        ripple + 0.005 * octave(12, 0.2) + 0.0009 * octave(13, 0.018) + 0.0004 * octave(14, 0.0055)
     }
 }
 

@@ -8,15 +8,17 @@ use crate::geometry::DVec3;
 /// Wavelength of the noise, edge lengths: matching windows make it spatially correlated.
 const NOISE_WAVELENGTH: f64 = 2.5;
 
-/// The largest part of the kept triangles, with the vertices that it uses.
-pub(super) fn cut(mesh: &Mesh, keep: &[bool]) -> Mesh {
+/// The parts of the kept triangles that have at least so many of them, with the vertices that they use.
+///
+/// The largest part stays in any case.
+pub(super) fn cut(mesh: &Mesh, keep: &[bool], least: usize) -> Mesh {
     let kept: Vec<[u32; 3]> = mesh.triangles.iter().zip(keep).filter(|&(_, &k)| k).map(|(t, _)| *t).collect();
     let (part, count) = components(&neighbours(&kept), &vec![(); kept.len()]);
     let size = sizes(&part, count);
-    let largest = (0..count).max_by_key(|&p| (size[p as usize], std::cmp::Reverse(p)));
+    let least = least.min(size.iter().copied().max().unwrap_or(0));
     let mut cut = Mesh::default();
     let mut new_id = vec![u32::MAX; mesh.vertices.len()];
-    for (triangle, _) in kept.iter().zip(&part).filter(|&(_, &p)| Some(p) == largest) {
+    for (triangle, _) in kept.iter().zip(&part).filter(|&(_, &p)| size[p as usize] >= least) {
         cut.triangles.push(triangle.map(|v| {
             let id = &mut new_id[v as usize];
             if *id == u32::MAX {

@@ -11,6 +11,9 @@ use crate::geometry::DVec3;
 /// The stone of a triangle that lies on sand.
 pub const SAND: u32 = u32::MAX;
 
+/// Smaller islands in the unseen are left out, triangles; a stone's cap behind its overhang stays.
+const ISLAND: usize = 100;
+
 /// What scene to make. Values beyond the ranges given are brought into them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SceneSettings {
@@ -44,14 +47,14 @@ impl Default for SceneSettings {
     fn default() -> Self {
         SceneSettings {
             seed: 1,
-            side_m: 0.46,
-            stones: 560,
+            side_m: 0.40,
+            stones: 420,
             median_b_m: 0.014,
             sigma_ln_b: 0.4,
             min_b_m: 0.007,
             max_b_m: 0.045,
             crowding: 0.5,
-            voxel_m: 0.95e-3,
+            voxel_m: 1.15e-3,
             view_limit_deg: 50.0,
             smoothing_passes: 2,
             noise_voxels: 0.03,
@@ -150,8 +153,8 @@ pub fn make_scene(settings: &SceneSettings) -> Scene {
 fn surveyed_surface(settings: &SceneSettings, bed: &Bed) -> Mesh {
     let voxels = Voxels::sample(settings, bed);
     let whole = polygonise(&voxels);
-    let outer = finish::cut(&whole, &vec![true; whole.triangles.len()]);
-    let mut mesh = finish::cut(&outer, &sight::seen(&outer, &voxels, settings.view_limit_deg));
+    let outer = finish::cut(&whole, &vec![true; whole.triangles.len()], usize::MAX);
+    let mut mesh = finish::cut(&outer, &sight::seen(&outer, &voxels, settings.view_limit_deg), ISLAND);
     finish::smooth(&mut mesh, settings.smoothing_passes);
     finish::roughen(&mut mesh, settings.seed ^ 31, settings.noise_voxels * settings.voxel_m, settings.voxel_m);
     mesh

@@ -1,11 +1,14 @@
 //! The shape of one stone: a superellipsoid with low-order bumps.
 
-use super::random::Random;
+use super::random::{Random, noise};
 use crate::geometry::DVec3;
 use glam::DMat3;
 
 /// How many waves roughen a stone.
 const BUMPS: usize = 4;
+/// Wavelength and height of pits and knobs, metres: fresh breaks and percussion marks.
+const TEXTURE_WAVELENGTH_M: f64 = 0.0055;
+const TEXTURE_M: f64 = 0.00035;
 /// Directions in which the full axes are sampled; their spacing costs the axes less than 0.1 %.
 const AXIS_SAMPLES: u32 = 4000;
 
@@ -20,6 +23,7 @@ pub(super) struct Shape {
     /// Exponents of the superellipsoid: round the a-b plane, and against c.
     exponents: [f64; 2],
     bumps: [Bump; BUMPS],
+    texture: u64,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -50,6 +54,7 @@ impl Shape {
             half: 0.5 * b_m * DVec3::new(1.0 / b_over_a, 1.0, c_over_b),
             exponents,
             bumps,
+            texture: random.bits(),
         }
     }
 
@@ -69,7 +74,7 @@ impl Shape {
         if !(0.75..=1.3).contains(&radius) && rough.abs() > near_m {
             return rough;
         }
-        (self.level(scaled, radius) - 1.0) * metres
+        (self.level(scaled, radius) - 1.0) * metres - TEXTURE_M * noise(self.texture, local / TEXTURE_WAVELENGTH_M)
     }
 
     /// 1 on the surface, proportional to the distance from the centre.
@@ -127,7 +132,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_ellipsoid_has_its_own_axes_and_zero_distance_on_its_surface() {
+    fn an_ellipsoid_has_its_own_axes_and_a_surface_within_its_texture() {
         let mut shape = Shape::random(&mut Random::new(1, 2), 0.02);
         shape.exponents = [2.0, 2.0];
         shape.bumps.iter_mut().for_each(|b| b.amplitude = 0.0);
@@ -138,7 +143,7 @@ mod tests {
         assert!((directions.determinant() - 1.0).abs() < 1e-12);
         for direction in sphere(50) {
             let on = shape.centre + shape.rotation * (direction * shape.half);
-            assert!(shape.distance_m(on, 1e-3).abs() < 1e-12);
+            assert!(shape.distance_m(on, 1e-3).abs() <= TEXTURE_M);
         }
     }
 }
