@@ -12,7 +12,7 @@ const CELL_M: f64 = 1e-3;
 /// Places tried for a stone before it is left out.
 const TRIES: usize = 80;
 /// Largest share of its own or another stone's plan that an overlap may take.
-const MAX_OVERLAP: f64 = 0.22;
+const MAX_OVERLAP: f64 = 0.3;
 /// How far a stone may be lifted by those it lies on, in its own heights.
 const MAX_LIFT: f64 = 0.5;
 /// How deep stones press into those they lie on, in heights: hides that they touch at one point only.

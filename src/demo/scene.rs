@@ -48,16 +48,16 @@ impl Default for SceneSettings {
         SceneSettings {
             seed: 1,
             side_m: 0.40,
-            stones: 420,
+            stones: 450,
             median_b_m: 0.014,
             sigma_ln_b: 0.4,
             min_b_m: 0.007,
             max_b_m: 0.045,
-            crowding: 0.5,
+            crowding: 0.8,
             voxel_m: 1.15e-3,
             view_limit_deg: 50.0,
             smoothing_passes: 2,
-            noise_voxels: 0.03,
+            noise_voxels: 0.04,
         }
     }
 }

@@ -74,7 +74,11 @@ impl Shape {
         if !(0.75..=1.3).contains(&radius) && rough.abs() > near_m {
             return rough;
         }
-        (self.level(scaled, radius) - 1.0) * metres - TEXTURE_M * noise(self.texture, local / TEXTURE_WAVELENGTH_M)
+        (self.level(scaled, radius) - 1.0) * metres - self.texture_m(local)
+    }
+
+    fn texture_m(&self, local: DVec3) -> f64 {
+        TEXTURE_M * noise(self.texture, local / TEXTURE_WAVELENGTH_M)
     }
 
     /// 1 on the surface, proportional to the distance from the centre.
@@ -99,11 +103,13 @@ impl Shape {
         )
     }
 
-    /// Full axes with bumps, longest first, and their right-handed directions (columns).
+    /// Full axes with bumps and texture, longest first, and their right-handed directions (columns).
     pub(super) fn axes(&self) -> ([f64; 3], DMat3) {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for direction in sphere(AXIS_SAMPLES) {
-            let surface = direction * self.half / self.level(direction, 1.0);
+            let smooth = direction * self.half / self.level(direction, 1.0);
+            let outward = (smooth / (self.half * self.half)).normalize();
+            let surface = smooth + outward * self.texture_m(smooth);
             low = low.min(surface);
             high = high.max(surface);
         }
@@ -138,7 +144,7 @@ mod tests {
         shape.bumps.iter_mut().for_each(|b| b.amplitude = 0.0);
         let (axes, directions) = shape.axes();
         for (axis, half) in axes.iter().zip(shape.half.to_array()) {
-            assert!((axis / (2.0 * half) - 1.0).abs() < 2e-3, "{axis} against {}", 2.0 * half);
+            assert!((axis - 2.0 * half).abs() < 2.0 * TEXTURE_M + 1e-5, "{axis} against {}", 2.0 * half);
         }
         assert!((directions.determinant() - 1.0).abs() < 1e-12);
         for direction in sphere(50) {
