@@ -1,5 +1,6 @@
 //! What can end a run, and how the process then exits.
 
+use crate::demo::DemoError;
 use crate::index::IndexError;
 use crate::open::OpenError;
 use crate::pipeline::{Interrupted, LostJob};
@@ -26,6 +27,9 @@ pub enum Error {
     /// A result cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
+    /// The sample scene cannot be written.
+    #[error(transparent)]
+    Demo(#[from] DemoError),
     /// Somebody pressed Ctrl-C.
     #[error(transparent)]
     Interrupted(#[from] Interrupted),

@@ -2,6 +2,7 @@
 
 use clap::Parser;
 use gravelometer::cli::{Cli, Command, DemoArgs, InspectArgs, RunArgs, SettingArgs, reporter};
+use gravelometer::demo::{Demonstration, demonstrate};
 use gravelometer::error::{Error, ExitCode};
 use gravelometer::pipeline::Control;
 use gravelometer::run::{Job, run};
@@ -44,8 +45,8 @@ fn run_command(args: &RunArgs) -> Result<ExitCode, Error> {
     let outcome = run(&job, &*progress, &control())?;
     progress.note(&format!(
         "{} grains and {} oversize bodies in {}; {:.2} triangles segmented for each of the survey",
-        outcome.grains,
-        outcome.oversize,
+        outcome.catalogue.grains.len(),
+        outcome.catalogue.oversize.len(),
         job.out.display(),
         outcome.segmented_per_triangle
     ));
@@ -77,6 +78,15 @@ fn settings_command(args: &SettingArgs) -> Result<ExitCode, Error> {
     Ok(ExitCode::Done)
 }
 
-fn demo_command(_: &DemoArgs) -> Result<ExitCode, Error> {
-    todo!()
+fn demo_command(args: &DemoArgs) -> Result<ExitCode, Error> {
+    let what = Demonstration { out: args.out.clone(), seed: args.seed, threads: args.threads, force: args.force };
+    let progress = reporter(args.log);
+    let shown = demonstrate(&what, &*progress, &control())?;
+    println!("{}", shown.score);
+    println!("\nThe scene, what is in it, and the results:");
+    for file in shown.files.iter().chain(&shown.outcome.files) {
+        println!("  {}", file.display());
+    }
+    println!("Look at grains.png (true stones outlined in black), or open grains.gpkg in QGIS.");
+    Ok(if shown.outcome.lost.is_empty() { ExitCode::Done } else { ExitCode::DoneWithLosses })
 }

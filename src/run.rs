@@ -10,7 +10,7 @@ use crate::pipeline::{Budget, Control, Crew, LostJob, memory_there_bytes};
 use crate::progress::{Progress, Unit};
 use crate::segment::smallest_grain_area_m2;
 use crate::settings::Settings;
-use crate::stitch::{TileReport, stitch};
+use crate::stitch::{Catalogue, TileReport, stitch};
 use crate::tile::Plan;
 use crate::write::{OutputFolder, Results, WholeMesh, write_all};
 use std::path::{Path, PathBuf};
@@ -34,10 +34,8 @@ pub struct Job {
 pub struct Outcome {
     /// The files written.
     pub files: Vec<PathBuf>,
-    /// Number of grains.
-    pub grains: u64,
-    /// Number of bodies wider than `max_grain_m`.
-    pub oversize: u64,
+    /// What was found. Grains carry their triangles when a labelled mesh was asked for.
+    pub catalogue: Catalogue,
     /// Tiles whose grains are missing.
     pub lost: Vec<LostJob>,
     /// Triangles segmented for each triangle of the survey: what halos cost.
@@ -108,13 +106,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
         mesh: settings.output.labelled_mesh.then_some(&mesh),
     };
     let files = write(&folder, &results, progress)?;
-    Ok(Outcome {
-        files,
-        grains: catalogue.grains.len() as u64,
-        oversize: catalogue.oversize.len() as u64,
-        lost: found.lost,
-        segmented_per_triangle: segmented_per_triangle(&tiles),
-    })
+    Ok(Outcome { files, catalogue, lost: found.lost, segmented_per_triangle: segmented_per_triangle(&tiles) })
 }
 
 /// Outlines within this many mean edges touch: grains are separated by a valley of a few triangles.
