@@ -26,6 +26,9 @@ pub fn ellipsoid_axes(points: &[DVec3]) -> Option<[f64; 3]> {
     axes_of(&quadric).map(|axes| axes.map(|a| a * spread))
 }
 
+/// Share of the normal matrix's trace that is added to its diagonal: far below any real noise.
+const RIDGE: f64 = 1e-13;
+
 /// Coefficients of x², y², z², 2yz, 2xz, 2xy, 2x, 2y, 2z, 1.
 fn fit(points: impl Iterator<Item = DVec3>) -> Option<SVector<f64, 10>> {
     let mut scatter = SMatrix::<f64, 10, 10>::zeros();
@@ -49,6 +52,8 @@ fn fit(points: impl Iterator<Item = DVec3>) -> Option<SVector<f64, 10>> {
     let s22: Matrix4<f64> = scatter.fixed_view::<4, 4>(6, 6).into_owned();
     let inverse = s22.try_inverse()?;
     let reduced = s11 - s12 * inverse * s12.transpose();
+    // On an exact ellipsoid the least eigenvalue is 0, and rounding may make it negative.
+    let reduced = reduced + Matrix6::identity() * (reduced.trace() * RIDGE);
     // With reduced = L L', the constrained minimum is the greatest eigenvalue of L^-1 C L^-T.
     let lower = reduced.cholesky()?.l().try_inverse()?;
     let mut constraint = Matrix6::<f64>::zeros();
