@@ -11,6 +11,8 @@ use glam::DMat3;
 const CELL_M: f64 = 1e-3;
 /// Places tried for a stone before it is left out.
 const TRIES: usize = 80;
+/// Draws of a b axis between the limits before it is moved to the nearer one: the limits may coincide.
+const B_AXIS_TRIES: usize = 100;
 /// Largest share of its own or another stone's plan that an overlap may take.
 const MAX_OVERLAP: f64 = 0.3;
 /// How far a stone may be lifted by those it lies on, in its own heights.
@@ -38,12 +40,14 @@ pub(super) fn place(settings: &SceneSettings, sand: &Sand) -> Vec<Shape> {
 }
 
 fn b_axis(settings: &SceneSettings, random: &mut Random) -> f64 {
-    loop {
-        let b = settings.median_b_m * (settings.sigma_ln_b * random.normal()).exp();
-        if (settings.min_b_m..=settings.max_b_m).contains(&b) {
-            return b;
+    let mut b_m = settings.median_b_m;
+    for _ in 0..B_AXIS_TRIES {
+        b_m = settings.median_b_m * (settings.sigma_ln_b * random.normal()).exp();
+        if (settings.min_b_m..=settings.max_b_m).contains(&b_m) {
+            break;
         }
     }
+    b_m.clamp(settings.min_b_m, settings.max_b_m)
 }
 
 /// What lies on top in every cell so far.
