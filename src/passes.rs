@@ -16,6 +16,9 @@ use crate::settings::SegmentSettings;
 use crate::stitch::{TileFinding, TileReport};
 use crate::tile::{NormalField, Plan, Tile, TileMesh};
 
+/// A value at each point, or none where something beyond the field could change it.
+type PointValues<'f> = dyn Fn(&NormalField, &[DVec3]) -> Vec<Option<f64>> + Sync + 'f;
+
 /// The survey as the passes see it.
 pub struct Survey<'a> {
     /// Vertices and triangles.
@@ -92,7 +95,7 @@ impl Survey<'_> {
         &self,
         crew: &Crew,
         halo_m: f64,
-        values: &(dyn Fn(&NormalField, &[DVec3]) -> Vec<Option<f64>> + Sync),
+        values: &PointValues,
         mut collect: impl FnMut(&[u64], Vec<f64>),
     ) -> Result<Vec<LostJob>, Interrupted> {
         let first = |job: usize| self.with_halo(&self.tile(job).core, halo_m);
