@@ -6,7 +6,7 @@
 mod hull;
 
 pub use glam::DVec3;
-pub use hull::{Hull, hull, sphericity};
+pub use hull::{Hull, flatter_than, hull, sphericity};
 
 /// A rectangle in plan, metres in the local frame. A side may be infinite.
 #[derive(Debug, Clone, Copy, PartialEq)]

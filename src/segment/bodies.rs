@@ -4,7 +4,7 @@ use super::Sizes;
 use super::components::{Components, Part};
 use super::edges::Edges;
 use super::state::{Labels, NONE, OVERSIZE, State};
-use crate::geometry::{hull, sphericity};
+use crate::geometry::flatter_than;
 use crate::settings::SegmentSettings;
 use crate::tile::TileMesh;
 use rayon::prelude::*;
@@ -58,8 +58,7 @@ pub fn drop_flat(mesh: &TileMesh, labels: &mut Labels, min_sphericity: f64) {
         .par_iter()
         .map(|body| {
             let triangles: Vec<u32> = body.iter().map(|&(_, t)| t).collect();
-            let hull = hull(&mesh.points_of(&triangles));
-            sphericity(hull.volume_m3, hull.area_m2) < min_sphericity
+            flatter_than(&mesh.points_of(&triangles), min_sphericity)
         })
         .collect();
     for (_, t) in bodies.iter().zip(&flat).filter(|(_, f)| **f).flat_map(|(b, _)| b.iter()) {
