@@ -48,7 +48,10 @@ fn fit(points: impl Iterator<Item = DVec3>) -> Option<SVector<f64, 10>> {
     let s12: Matrix6x4<f64> = scatter.fixed_view::<6, 4>(0, 6).into_owned();
     let s22: Matrix4<f64> = scatter.fixed_view::<4, 4>(6, 6).into_owned();
     let inverse = s22.try_inverse()?;
-    let reduced = s11 - s12 * inverse * s12.transpose();
+    let mut reduced = s11 - s12 * inverse * s12.transpose();
+    // Points that lie exactly on an ellipsoid make this singular, and rounding then makes it indefinite.
+    let ridge = 1e-13 * s11.trace();
+    (0..6).for_each(|i| reduced[(i, i)] += ridge);
     // With reduced = L L', the constrained minimum is the greatest eigenvalue of L^-1 C L^-T.
     let lower = reduced.cholesky()?.l().try_inverse()?;
     let mut constraint = Matrix6::<f64>::zeros();
