@@ -199,10 +199,9 @@ fn a_stone_of_known_axes_and_attitude_is_measured_as_it_lies() {
     for (trend, plunge, spin) in [(30.0, 20.0, 0.0), (250.0, 35.0, 15.0), (120.0, 5.0, -40.0), (0.0, 60.0, 10.0)] {
         let turn = laid(trend, plunge, spin);
         let g = measured(&stone(axes_m, turn, 60));
-        for i in 0..3 {
-            assert!(relative(g.axes_m[i], axes_m[i]) < 0.01, "{:?}", g.axes_m);
-            assert!(relative(g.ellipsoid_axes_m.unwrap()[i], axes_m[i]) < 0.01, "{:?}", g.ellipsoid_axes_m);
-        }
+        let near = |found: [f64; 3]| found.iter().zip(axes_m).all(|(f, a)| relative(*f, a) < 0.01);
+        assert!(near(g.axes_m), "{:?}", g.axes_m);
+        assert!(near(g.ellipsoid_axes_m.unwrap()), "{:?}", g.ellipsoid_axes_m);
         let at = Attitude::of(g.directions);
         assert!(angle_between(at.a_trend_deg.unwrap(), trend) < 1.0, "{at:?}");
         assert!((at.a_plunge_deg - plunge).abs() < 1.0, "{at:?}");
