@@ -160,7 +160,8 @@ fn whole<T>(name: &'static str, pass: Pass<T>) -> Result<T, Error> {
 }
 
 fn write(folder: &OutputFolder, results: &Results, progress: &dyn Progress) -> Result<Vec<PathBuf>, Error> {
-    progress.begin("write", crate::write::OUTPUTS.len() as u64, Unit::Files);
+    let files = crate::write::OUTPUTS.len() - usize::from(results.mesh.is_none());
+    progress.begin("write", files as u64, Unit::Files);
     let written = write_all(folder, results, &|_| progress.advance(1));
     progress.end();
     Ok(written?)

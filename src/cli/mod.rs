@@ -107,13 +107,13 @@ pub struct SettingArgs {
     pub unit: Option<Unit>,
     /// Widest grain, metres; wider bodies are reported as oversize; 0: no limit [segment.max_grain_m;
     /// default: 2]
-    #[arg(long, value_name = "METRES", help_heading = "Grains")]
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true, help_heading = "Grains")]
     pub max_grain: Option<f64>,
     /// Smallest grain, m² of visible surface [segment.min_grain_area_m2; default: 1e-4]
-    #[arg(long, value_name = "M2", help_heading = "Grains")]
+    #[arg(long, value_name = "M2", allow_negative_numbers = true, help_heading = "Grains")]
     pub min_grain_area: Option<f64>,
     /// Side of a tile's core, metres; 0: from the memory [work.tile_size_m; default: 0]
-    #[arg(long, value_name = "METRES", help_heading = "Work")]
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true, help_heading = "Work")]
     pub tile_size: Option<f64>,
     /// Compute threads; 0: all cores [work.threads; default: 0]
     #[arg(long, value_name = "N", help_heading = "Work")]

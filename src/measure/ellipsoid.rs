@@ -2,7 +2,8 @@
 //!
 //! The ellipsoid-specific linear fit of Li & Griffiths (2004, Geometric Modeling and Processing, 335-340,
 //! doi:10.1109/GMAP.2004.1290055): the quadric x'Ax + 2 b'x + c = 0 of least algebraic distance under
-//! 4 J - I² = 1, solved as a symmetric eigenproblem. The field uses it for grains (Steer et al. 2022);
+//! k J - I² = 1 (I = trace of A, J = the sum of its principal 2x2 minors), solved as a symmetric
+//! eigenproblem, with the largest k that gives an ellipsoid. The field uses it for grains (Steer et al. 2022);
 //! from a cap it is less steady than the box along the principal axes, which stays the reported size.
 
 use crate::geometry::DVec3;
@@ -22,58 +23,93 @@ pub fn ellipsoid_axes(points: &[DVec3]) -> Option<[f64; 3]> {
     if spread <= 0.0 {
         return None;
     }
-    let quadric = fit(points.iter().map(|&p| (p - mean) / spread))?;
-    axes_of(&quadric).map(|axes| axes.map(|a| a * spread))
+    fit(points.iter().map(|&p| (p - mean) / spread)).map(|axes| axes.map(|a| a * spread))
 }
 
-/// Share of the normal matrix's trace that is added to its diagonal: far below any real noise.
+/// Share of the normal matrix's trace that is added to its diagonal, far below any real noise: points that
+/// lie exactly on an ellipsoid make it singular, and rounding then makes it indefinite.
 const RIDGE: f64 = 1e-13;
+/// With k = 4 every solution is an ellipsoid, but flat ones (c/a below about 0.45) are out of reach.
+const SMALLEST_K: f64 = 4.0;
+/// With this k discs of c/a = 0.02 are within reach, and solutions need not be ellipsoids.
+const LARGEST_K: f64 = 1e4;
+/// Halvings of the logarithm of k: the axes no longer change in their fourth digit.
+const HALVINGS: u32 = 16;
 
-/// Coefficients of x², y², z², 2yz, 2xz, 2xy, 2x, 2y, 2z, 1.
-fn fit(points: impl Iterator<Item = DVec3>) -> Option<SVector<f64, 10>> {
-    let mut scatter = SMatrix::<f64, 10, 10>::zeros();
-    for p in points {
-        let d = SVector::<f64, 10>::from_column_slice(&[
-            p.x * p.x,
-            p.y * p.y,
-            p.z * p.z,
-            2.0 * p.y * p.z,
-            2.0 * p.x * p.z,
-            2.0 * p.x * p.y,
-            2.0 * p.x,
-            2.0 * p.y,
-            2.0 * p.z,
-            1.0,
-        ]);
-        scatter.ger(1.0, &d, &d, 1.0);
+/// Full axes of the ellipsoid under the largest k that gives one, in the points' unit.
+fn fit(points: impl Iterator<Item = DVec3>) -> Option<[f64; 3]> {
+    let normal = Normal::of(points)?;
+    let axes = |k: f64| normal.solve(k).as_ref().and_then(axes_of);
+    if let Some(flat_or_not) = axes(LARGEST_K) {
+        return Some(flat_or_not);
     }
-    let s11: Matrix6<f64> = scatter.fixed_view::<6, 6>(0, 0).into_owned();
-    let s12: Matrix6x4<f64> = scatter.fixed_view::<6, 4>(0, 6).into_owned();
-    let s22: Matrix4<f64> = scatter.fixed_view::<4, 4>(6, 6).into_owned();
-    let inverse = s22.try_inverse()?;
-    let reduced = s11 - s12 * inverse * s12.transpose();
-    // On an exact ellipsoid the least eigenvalue is 0, and rounding may make it negative.
-    let reduced = reduced + Matrix6::identity() * (reduced.trace() * RIDGE);
-    // With reduced = L L', the constrained minimum is the greatest eigenvalue of L^-1 C L^-T.
-    let lower = reduced.cholesky()?.l().try_inverse()?;
-    let mut constraint = Matrix6::<f64>::zeros();
-    for i in 0..3 {
-        for j in 0..3 {
-            constraint[(i, j)] = if i == j { -1.0 } else { 1.0 };
+    let mut best = axes(SMALLEST_K)?;
+    let (mut low, mut high) = (SMALLEST_K.ln(), LARGEST_K.ln());
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        match axes(middle.exp()) {
+            Some(found) => (low, best) = (middle, found),
+            None => high = middle,
         }
-        constraint[(i + 3, i + 3)] = -4.0;
     }
-    let eigen = SymmetricEigen::new(lower * constraint * lower.transpose());
-    let best = eigen.eigenvalues.imax();
-    if eigen.eigenvalues[best] <= 0.0 {
-        return None;
+    Some(best)
+}
+
+/// The normal equations of the quadric fit, with the linear part eliminated.
+struct Normal {
+    /// Inverse of the lower Cholesky factor of the reduced matrix of the quadratic coefficients.
+    lower: Matrix6<f64>,
+    /// What gives the linear coefficients from the quadratic ones.
+    rest: SMatrix<f64, 4, 6>,
+}
+
+impl Normal {
+    fn of(points: impl Iterator<Item = DVec3>) -> Option<Normal> {
+        let mut scatter = SMatrix::<f64, 10, 10>::zeros();
+        for p in points {
+            let d = SVector::<f64, 10>::from_column_slice(&[
+                p.x * p.x,
+                p.y * p.y,
+                p.z * p.z,
+                2.0 * p.y * p.z,
+                2.0 * p.x * p.z,
+                2.0 * p.x * p.y,
+                2.0 * p.x,
+                2.0 * p.y,
+                2.0 * p.z,
+                1.0,
+            ]);
+            scatter.ger(1.0, &d, &d, 1.0);
+        }
+        let s11: Matrix6<f64> = scatter.fixed_view::<6, 6>(0, 0).into_owned();
+        let s12: Matrix6x4<f64> = scatter.fixed_view::<6, 4>(0, 6).into_owned();
+        let s22: Matrix4<f64> = scatter.fixed_view::<4, 4>(6, 6).into_owned();
+        let rest = -(s22.try_inverse()? * s12.transpose());
+        let reduced = s11 + s12 * rest + Matrix6::identity() * (s11.trace() * RIDGE);
+        Some(Normal { lower: reduced.cholesky()?.l().try_inverse()?, rest })
     }
-    let shape = lower.transpose() * eigen.eigenvectors.column(best);
-    let rest = -(inverse * s12.transpose() * shape);
-    let mut all = SVector::<f64, 10>::zeros();
-    all.fixed_rows_mut::<6>(0).copy_from(&shape);
-    all.fixed_rows_mut::<4>(6).copy_from(&rest);
-    Some(all)
+
+    /// Coefficients of x², y², z², 2yz, 2xz, 2xy, 2x, 2y, 2z, 1 under k J - I² = 1. With the reduced matrix
+    /// as L L', they come from the greatest eigenvalue of L^-1 C L^-T, where C is that constraint.
+    fn solve(&self, k: f64) -> Option<SVector<f64, 10>> {
+        let mut constraint = Matrix6::<f64>::zeros();
+        for i in 0..3 {
+            for j in 0..3 {
+                constraint[(i, j)] = if i == j { -1.0 } else { k / 2.0 - 1.0 };
+            }
+            constraint[(i + 3, i + 3)] = -k;
+        }
+        let eigen = SymmetricEigen::new(self.lower * constraint * self.lower.transpose());
+        let best = eigen.eigenvalues.imax();
+        if eigen.eigenvalues[best] <= 0.0 {
+            return None;
+        }
+        let shape = self.lower.transpose() * eigen.eigenvectors.column(best);
+        let mut all = SVector::<f64, 10>::zeros();
+        all.fixed_rows_mut::<6>(0).copy_from(&shape);
+        all.fixed_rows_mut::<4>(6).copy_from(&(self.rest * shape));
+        Some(all)
+    }
 }
 
 fn axes_of(q: &SVector<f64, 10>) -> Option<[f64; 3]> {
@@ -103,6 +139,20 @@ mod tests {
         let axes = ellipsoid_axes(&points).expect("fits");
         for (found, true_m) in axes.iter().zip([0.08, 0.06, 0.04]) {
             assert!((found - true_m).abs() < 1e-7, "{axes:?}");
+        }
+    }
+
+    #[test]
+    fn the_upper_half_of_a_flat_disc_is_not_thickened() {
+        let points: Vec<DVec3> = (0..900)
+            .map(|i| {
+                let (u, v) = (f64::from(i % 30) * 0.2094, 0.05 + f64::from(i / 30) * 0.05);
+                DVec3::new(0.15 * v.sin() * u.cos(), 0.14 * v.sin() * u.sin(), 0.02 * v.cos())
+            })
+            .collect();
+        let axes = ellipsoid_axes(&points).expect("fits");
+        for (found, true_m) in axes.iter().zip([0.30, 0.28, 0.04]) {
+            assert!((found - true_m).abs() < 1e-5, "{axes:?}");
         }
     }
 

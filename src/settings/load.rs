@@ -36,7 +36,7 @@ pub enum SettingsError {
         message: String,
     },
     /// A value outside its range.
-    #[error("{key} = {value}: {rule}")]
+    #[error("{key} = {value}: {rule}\nhelp: `gravelometer settings` prints every key with its default")]
     Range {
         /// Dotted key.
         key: &'static str,

@@ -1,6 +1,8 @@
 //! What several test binaries share: where the data lies, and how the authors' results are read.
 #![allow(dead_code, unreachable_pub, missing_docs, clippy::unwrap_used)]
 
+pub mod bed;
+
 use std::path::PathBuf;
 
 /// The folder of shared test data, or nothing (with a printed reason) where it is absent.

@@ -1,0 +1,363 @@
+//! The command line as people meet it: help that teaches, every setting by every way, and messages that say
+//! what, where and what to do.
+#![allow(missing_docs, clippy::unwrap_used, unreachable_pub)]
+
+mod support;
+
+use gravelometer::geometry::DVec3;
+use gravelometer::open::MemorySurface;
+use gravelometer::settings::Settings;
+use gravelometer::write::OUTPUTS;
+use std::collections::BTreeMap;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+use support::bed::{bed, write_ply};
+
+struct Said {
+    code: i32,
+    out: String,
+    err: String,
+}
+
+fn gravelometer<S: AsRef<OsStr>>(args: impl IntoIterator<Item = S>) -> Said {
+    let output = assert_cmd::Command::new(env!("CARGO_BIN_EXE_gravelometer")).args(args).output().unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    let said = Said { code: output.status.code().unwrap(), out: text(output.stdout), err: text(output.stderr) };
+    assert!(!said.err.contains("panicked"), "{}", said.err);
+    said
+}
+
+fn words(line: &str) -> Vec<String> {
+    line.split(' ').map(str::to_owned).collect()
+}
+
+/// Runs a mesh into a folder, with more arguments.
+fn run(mesh: &Path, out: &Path, more: &[&str]) -> Said {
+    let mut args = vec!["run".into(), mesh.as_os_str().to_owned(), "-o".into(), out.as_os_str().to_owned()];
+    args.extend(more.iter().map(|a| a.into()));
+    gravelometer(args)
+}
+
+impl Said {
+    fn fails(&self, code: i32, says: &[&str]) {
+        assert_eq!(self.code, code, "{}", self.err);
+        for text in says {
+            assert!(self.err.contains(text), "`{text}` is not in: {}", self.err);
+        }
+    }
+}
+
+fn scene() -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = folder.path().join("bed.ply");
+    write_ply(&mesh, &bed(21, 60, 50));
+    (folder, mesh)
+}
+
+fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    std::fs::read_dir(folder)
+        .unwrap()
+        .map(|e| e.unwrap().path())
+        .map(|p| (p.clone(), std::fs::read(&p).unwrap()))
+        .collect()
+}
+
+#[test]
+fn help_names_every_command_and_the_exit_codes() {
+    let said = gravelometer(["--help"]);
+    assert_eq!((said.code, said.err.as_str()), (0, ""));
+    for text in ["run", "inspect", "demo", "settings", "Exit codes", "130"] {
+        assert!(said.out.contains(text), "{text}: {}", said.out);
+    }
+}
+
+#[test]
+fn help_of_run_teaches_units_keys_files_and_examples() {
+    let said = gravelometer(["run", "--help"]);
+    assert_eq!(said.code, 0);
+    let texts = [
+        "metres",
+        "m²",
+        "[segment.max_grain_m",
+        "[input.offset",
+        "[work.memory",
+        "EPSG:2193",
+        "Examples:",
+        "gravelometer run reach.ply",
+        "Exit codes",
+        "does not depend on",
+    ];
+    for text in texts.into_iter().chain(OUTPUTS) {
+        assert!(said.out.contains(text), "{text}: {}", said.out);
+    }
+    for command in ["inspect", "demo", "settings"] {
+        assert_eq!(gravelometer([command, "--help"]).code, 0, "{command}");
+    }
+}
+
+#[test]
+fn the_version_is_that_of_the_package() {
+    assert_eq!(gravelometer(["--version"]).out.trim(), concat!("gravelometer ", env!("CARGO_PKG_VERSION")));
+}
+
+/// Another value that the key accepts.
+fn another(section: &str, key: &str, value: &toml::Value) -> toml::Value {
+    let candidates: Vec<toml::Value> = match value {
+        toml::Value::Boolean(b) => vec![(!b).into()],
+        toml::Value::Integer(i) => vec![(i + 1).into()],
+        toml::Value::Float(f) => vec![(f + 0.3).into()],
+        toml::Value::Array(a) => vec![toml::Value::Array(vec![1.5.into(); a.len()])],
+        _ => ["mm", "triangle-count", "mean", "3GiB", "EPSG:2193"].into_iter().map(toml::Value::from).collect(),
+    };
+    let accepted = |v: &toml::Value| v != value && Settings::load(None, &[format!("{section}.{key}={v}")]).is_ok();
+    candidates.into_iter().find(accepted).unwrap_or_else(|| panic!("{section}.{key}: no other value is accepted"))
+}
+
+#[test]
+fn every_key_gives_the_same_settings_by_set_and_by_file_and_changes_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let default = toml::Table::try_from(Settings::default()).unwrap();
+    let mut keys = 0;
+    for (section, values) in &default {
+        for (key, value) in values.as_table().unwrap() {
+            let other = another(section, key, value);
+            let file = folder.path().join(format!("{section}-{key}.toml"));
+            std::fs::write(&file, format!("[{section}]\n{key} = {other}\n")).unwrap();
+            let by_set = gravelometer(["settings".into(), "--set".into(), format!("{section}.{key}={other}")]);
+            let by_file = gravelometer(["settings".as_ref(), "--config".as_ref(), file.as_os_str()]);
+            assert_eq!((by_set.code, by_file.code), (0, 0), "{} {}", by_set.err, by_file.err);
+            assert_eq!(by_set.out, by_file.out, "{section}.{key}");
+            let mut expected = default.clone();
+            expected[section][key] = other;
+            assert_eq!(by_set.out.parse::<toml::Table>().unwrap(), expected, "{section}.{key}");
+            keys += 1;
+        }
+    }
+    assert!(keys >= 25, "{keys} keys");
+}
+
+#[test]
+fn every_flag_gives_the_settings_of_its_key_and_wins_over_set_and_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("other.toml");
+    std::fs::write(&file, "[segment]\nmax_grain_m = 7.0\n[work]\nthreads = 9\n").unwrap();
+    for (flags, sets) in [
+        ("--crs EPSG:2193", "--set input.crs=EPSG:2193"),
+        ("--offset 1,-2.5,3", "--set input.offset=[1.0,-2.5,3.0]"),
+        ("--offset -1,2", "--set input.offset=[-1.0,2.0,0.0]"),
+        ("--unit mm", "--set input.unit=mm"),
+        ("--max-grain 1.25", "--set segment.max_grain_m=1.25"),
+        ("--min-grain-area 0.005", "--set segment.min_grain_area_m2=5e-3"),
+        ("--tile-size 12.5", "--set work.tile_size_m=12.5"),
+        ("--threads 3", "--set work.threads=3"),
+        ("--memory 500MB", "--set work.memory=500MB"),
+        ("--labelled-mesh", "--set output.labelled_mesh=true"),
+        ("--set segment.max_grain_m=4 --max-grain 3", "--set segment.max_grain_m=3.0"),
+        ("--config sandbox --threads 2", "--config sandbox --set work.threads=2"),
+    ] {
+        let [by_flag, by_set] = [flags, sets].map(|line| gravelometer(words(&format!("settings {line}"))));
+        assert_eq!((by_flag.code, by_set.code), (0, 0), "{flags}: {} {}", by_flag.err, by_set.err);
+        assert_eq!(by_flag.out, by_set.out, "{flags}");
+        assert_ne!(by_flag.out, gravelometer(["settings"]).out, "{flags}");
+    }
+    let over_file = gravelometer(words(&format!("settings --max-grain 1 --config {}", file.display()))).out;
+    assert!(over_file.contains("max_grain_m = 1.0") && over_file.contains("threads = 9"), "{over_file}");
+}
+
+#[test]
+fn printed_settings_can_be_read_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("again.toml");
+    let first = gravelometer(words("settings --config drone --set work.memory=3GiB --offset 1480000,5250000,700")).out;
+    std::fs::write(&file, &first).unwrap();
+    assert_eq!(gravelometer(["settings".as_ref(), "--config".as_ref(), file.as_os_str()]).out, first);
+}
+
+#[test]
+fn settings_that_cannot_be_used_end_with_code_2_and_name_the_key() {
+    let folder = tempfile::tempdir().unwrap();
+    let broken = folder.path().join("broken.toml");
+    std::fs::write(&broken, "[segment]\nmax_grain_m = = 2\n").unwrap();
+    let broken = broken.display().to_string();
+    for (line, says) in [
+        ("--set segment.minimum=3".to_owned(), vec!["minimum", "help:"]),
+        ("--set sediment.max_grain_m=3".to_owned(), vec!["sediment", "help:"]),
+        ("--set max_grain_m".to_owned(), vec!["section.key=value"]),
+        ("--set segment.min_sphericity=1.5".to_owned(), vec!["segment.min_sphericity = 1.5"]),
+        ("--set segment.max_grain_m=wide".to_owned(), vec!["segment.max_grain_m"]),
+        ("--set curvature.neighbours=0".to_owned(), vec!["curvature.neighbours = 0"]),
+        ("--set segment.erosion_iterations=-1".to_owned(), vec!["erosion_iterations"]),
+        ("--max-grain -1".to_owned(), vec!["-1"]),
+        ("--max-grain=-1".to_owned(), vec!["segment.max_grain_m = -1"]),
+        ("--max-grain=nan".to_owned(), vec!["segment.max_grain_m"]),
+        ("--memory many".to_owned(), vec!["work.memory = many"]),
+        ("--threads 5000".to_owned(), vec!["work.threads = 5000"]),
+        ("--offset 1".to_owned(), vec!["east,north"]),
+        ("--unit furlong".to_owned(), vec!["furlong"]),
+        ("--config nowhere.toml".to_owned(), vec!["nowhere.toml", "help:"]),
+        (format!("--config {broken}"), vec!["broken.toml", "line 2"]),
+        ("--no-such-flag".to_owned(), vec!["--no-such-flag"]),
+    ] {
+        gravelometer(words(&format!("settings {line}"))).fails(2, &says);
+    }
+    gravelometer(["run"]).fails(2, &["--out"]);
+    gravelometer(["run", "-o", "somewhere"]).fails(2, &["INPUTS"]);
+    gravelometer(["nonsense"]).fails(2, &["nonsense"]);
+}
+
+#[test]
+fn inputs_that_cannot_be_read_end_with_code_1_name_the_path_and_help() {
+    let (folder, mesh) = scene();
+    let missing = folder.path().join("missing.ply");
+    let out = folder.path().join("out");
+    run(&missing, &out, &[]).fails(1, &["missing.ply", "there is no such file", "\nhelp: "]);
+    let path = folder.path().to_str().unwrap();
+    run(folder.path(), &out, &[]).fails(1, &[path, "is a directory", "\nhelp: "]);
+    run(&mesh, &out, &["--crs", "EPSG:999999"]).fails(1, &["EPSG:999999", "\nhelp: "]);
+    run(&mesh, &out, &["--crs", "EPSG:4326"]).fails(1, &["not a projected system", "\nhelp: "]);
+    run(&mesh, &out, &["--set", "raster.cell_m=1e-5"]).fails(1, &["raster.cell_m", "\nhelp: "]);
+    assert_eq!(contents(&out).len(), 0);
+    gravelometer(["inspect".as_ref(), missing.as_os_str()]).fails(1, &["missing.ply", "\nhelp: "]);
+}
+
+#[test]
+fn older_results_are_touched_by_force_only_and_by_complete_results_only() {
+    let (folder, mesh) = scene();
+    let out = folder.path().join("out");
+    assert_eq!(run(&mesh, &out, &["--labelled-mesh"]).code, 0);
+    let notes = out.join("notes.txt");
+    std::fs::write(&notes, "mine").unwrap();
+    let before = contents(&out);
+    assert_eq!(before.len(), 7, "{:?}", before.keys());
+    run(&mesh, &out, &[]).fails(1, &["holds files already", "--force", "\nhelp: "]);
+    assert!(contents(&out) == before, "a refused run changed the folder");
+    let damaged = folder.path().join("damaged.ply");
+    let bytes = std::fs::read(&mesh).unwrap();
+    std::fs::write(&damaged, &bytes[..bytes.len() - 1]).unwrap();
+    run(&damaged, &out, &["--force"]).fails(1, &["damaged.ply"]);
+    assert!(contents(&out) == before, "a failed run changed the folder");
+    assert_eq!(run(&mesh, &out, &["--force", "--set", "raster.cell_m=0.25"]).code, 0);
+    let after = contents(&out);
+    assert!(after[&out.join("grain_size.tif")] != before[&out.join("grain_size.tif")], "nothing was replaced");
+    assert!(!after.contains_key(&out.join("labelled_mesh.ply")), "an older result was left among new ones");
+    assert_eq!(after[&notes], b"mine");
+}
+
+#[test]
+fn an_output_folder_that_cannot_be_is_refused() {
+    let (folder, mesh) = scene();
+    let file = folder.path().join("file");
+    std::fs::write(&file, "mine").unwrap();
+    run(&mesh, &file, &["--force"]).fails(1, &["is not a folder", "\nhelp: "]);
+    run(&mesh, &file.join("below"), &["--force"]).fails(1, &["file/below", "\nhelp: "]);
+    assert_eq!(std::fs::read(&file).unwrap(), b"mine");
+    if Path::new("/proc/self").exists() {
+        run(&mesh, Path::new("/proc/no-place-for-results"), &[]).fails(1, &["no-place-for-results", "\nhelp: "]);
+    }
+}
+
+/// A level sheet: not a grain on it.
+fn plane() -> MemorySurface {
+    let mut plane = MemorySurface::default();
+    for j in 0..=40u32 {
+        for i in 0..=40u32 {
+            plane.positions.push(DVec3::new(f64::from(i) * 0.01, f64::from(j) * 0.01, 0.25));
+        }
+    }
+    for (i, j) in (0..40u64).flat_map(|j| (0..40u64).map(move |i| (i, j))) {
+        let a = j * 41 + i;
+        plane.triangles.extend([[a, a + 1, a + 42], [a, a + 42, a + 41]]);
+    }
+    plane
+}
+
+#[test]
+fn a_survey_without_grains_is_a_result_with_all_its_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mesh, out) = (folder.path().join("plane.ply"), folder.path().join("out"));
+    write_ply(&mesh, &plane());
+    let said = run(&mesh, &out, &["--labelled-mesh", "--crs", "EPSG:2193"]);
+    assert_eq!(said.code, 0, "{}", said.err);
+    assert!(said.err.contains("0 grains"), "{}", said.err);
+    let mut csv = csv::Reader::from_path(out.join("grains.csv")).unwrap();
+    assert!(csv.headers().unwrap().iter().any(|h| h == "b_axis_m"));
+    assert_eq!(csv.records().count(), 0);
+    for name in ["summary.json", "run.json"] {
+        serde_json::from_slice::<serde_json::Value>(&std::fs::read(out.join(name)).unwrap()).unwrap();
+    }
+    use gdal::vector::LayerAccess;
+    let package = gdal::Dataset::open(out.join("grains.gpkg")).unwrap();
+    assert_eq!(package.layer_by_name("grains").unwrap().feature_count(), 0);
+    assert!(gdal::Dataset::open(out.join("grain_size.tif")).unwrap().raster_count() >= 6);
+    assert_eq!(gravelometer(["inspect".as_ref(), out.join("labelled_mesh.ply").as_os_str()]).code, 0);
+}
+
+#[test]
+fn json_lines_are_json_and_tell_every_stage_from_begin_to_end() {
+    let (folder, mesh) = scene();
+    let said = run(&mesh, &folder.path().join("out"), &["--log", "json"]);
+    assert_eq!((said.code, said.out.as_str()), (0, ""), "{}", said.err);
+    let lines: Vec<serde_json::Value> = said.err.lines().map(|l| serde_json::from_str(l).expect(l)).collect();
+    for stage in ["open", "index", "spacing", "curvature", "grains", "write"] {
+        for event in ["begin", "end"] {
+            let told = lines.iter().filter(|l| l["stage"] == stage && l["event"] == event).count();
+            assert_eq!(told, 1, "{event} of {stage}: {}", said.err);
+        }
+        let end = lines.iter().find(|l| l["stage"] == stage && l["event"] == "end").unwrap();
+        assert_eq!(end["done"], end["total"], "{stage}");
+    }
+    let plain = run(&mesh, &folder.path().join("plain"), &[]);
+    assert!(plain.err.contains("curvature: ") && !plain.err.contains('\r'), "{}", plain.err);
+}
+
+#[test]
+fn inspect_tells_people_and_programs_the_same() {
+    let (_folder, mesh) = scene();
+    let plain = gravelometer(["inspect".as_ref(), mesh.as_os_str()]);
+    let json = gravelometer(["inspect".as_ref(), mesh.as_os_str(), "--json".as_ref()]);
+    assert_eq!((plain.code, json.code), (0, 0), "{} {}", plain.err, json.err);
+    let value: serde_json::Value = serde_json::from_str(&json.out).unwrap();
+    let surface = bed(21, 60, 50);
+    let text = value.to_string();
+    for count in [surface.positions.len(), surface.triangles.len()] {
+        assert!(text.contains(&count.to_string()), "{text}");
+    }
+    assert_eq!(value["survey"]["has_colors"], true);
+    assert!(plain.out.contains("bed.ply") && plain.out.contains("survey (1 file)"), "{}", plain.out);
+    let scaled = gravelometer(words(&format!("inspect {} --unit mm --crs EPSG:2193 --json", mesh.display())));
+    let value: serde_json::Value = serde_json::from_str(&scaled.out).unwrap();
+    assert_eq!(value["survey"]["metres_per_input_unit"], 1e-3);
+    assert_eq!(value["survey"]["crs_code"], "EPSG:2193");
+}
+
+/// Without a limit every one of the hundreds of tiles looks at the whole survey, so that the grain pass takes
+/// minutes: the signal, sent when it begins, cannot come too late.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_ends_with_130_and_leaves_the_folder_as_it_was() {
+    use std::io::{BufRead, BufReader, Read};
+    use std::process::{Command, Stdio};
+    let folder = tempfile::tempdir().unwrap();
+    let (mesh, out) = (folder.path().join("bed.ply"), folder.path().join("out"));
+    write_ply(&mesh, &bed(22, 300, 200));
+    std::fs::create_dir(&out).unwrap();
+    std::fs::write(out.join("grains.csv"), "older").unwrap();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_gravelometer"))
+        .args(["run", "--force", "--log", "json", "--max-grain", "0", "--tile-size", "0.01", "-o"])
+        .args([&out, &mesh])
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap());
+    let mut line = String::new();
+    while !line.contains("\"grains\"") {
+        line.clear();
+        assert!(lines.read_line(&mut line).unwrap() > 0, "the run ended before its grain pass");
+    }
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let mut rest = String::new();
+    lines.read_to_string(&mut rest).unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(130), "{rest}");
+    assert!(rest.contains("interrupted") && !rest.contains("panicked"), "{rest}");
+    assert_eq!(contents(&out), BTreeMap::from([(out.join("grains.csv"), b"older".to_vec())]));
+}
