@@ -34,7 +34,7 @@ pub enum Error {
     #[error(transparent)]
     Interrupted(#[from] Interrupted),
     /// A tile of a pass on which all others depend panicked.
-    #[error("tile {} of the {pass} pass failed: {}\nhelp: this is a bug; please report it with the input's header and run.json", lost.job, lost.message)]
+    #[error("part {} of the {pass} pass failed: {}\nhelp: this is a bug; please report it with the input's header and the command", lost.job, lost.message)]
     TileFailed {
         /// The pass.
         pass: &'static str,

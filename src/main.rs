@@ -1,39 +1,44 @@
 //! The program: parse, run, say what went wrong, exit.
 
 use clap::Parser;
-use gravelometer::cli::{Cli, Command, DemoArgs, InspectArgs, RunArgs, SettingArgs, reporter};
+use gravelometer::cli::{Cli, Command, DemoArgs, InspectArgs, Log, RunArgs, SettingArgs, report_error, reporter};
 use gravelometer::demo::{Demonstration, demonstrate};
 use gravelometer::error::{Error, ExitCode};
 use gravelometer::pipeline::Control;
+use gravelometer::progress::Progress;
 use gravelometer::run::{Job, run};
 use gravelometer::settings::InputSettings;
+use std::io::Write;
 
 fn main() -> std::process::ExitCode {
-    let result = match Cli::parse().command {
-        Command::Run(args) => run_command(&args),
-        Command::Inspect(args) => inspect_command(&args),
-        Command::Demo(args) => demo_command(&args),
-        Command::Settings(args) => settings_command(&args),
+    let (log, result) = match Cli::parse().command {
+        Command::Run(args) => (args.log, run_command(&args)),
+        Command::Inspect(args) => (Log::Text, inspect_command(&args)),
+        Command::Demo(args) => (args.log, demo_command(&args)),
+        Command::Settings(args) => (Log::Text, settings_command(&args)),
     };
     let code = result.unwrap_or_else(|error| {
-        eprintln!("error: {error}");
+        report_error(log, &error);
         error.exit_code()
     });
     std::process::ExitCode::from(code as u8)
 }
 
-/// The flag that Ctrl-C sets. A second Ctrl-C ends the process at once.
-fn control() -> Control {
+/// The flag that Ctrl-C sets; tiles in flight are finished first. A second Ctrl-C ends the process at once.
+fn control(progress: &dyn Progress, log: Log) -> Control {
     let control = Control::default();
     let flag = control.clone();
     let set = ctrlc::set_handler(move || {
         if flag.cancel() {
             std::process::exit(ExitCode::Interrupted as i32);
         }
-        eprintln!("stopping after the tiles in flight; press Ctrl-C again to stop at once");
+        if log == Log::Text {
+            let _ =
+                writeln!(std::io::stderr().lock(), "stopping after the tiles in flight; Ctrl-C again stops at once");
+        }
     });
     if let Err(error) = set {
-        eprintln!("warning: Ctrl-C will end the run at once: {error}");
+        progress.warn(&format!("Ctrl-C will end the run at once: {error}"));
     }
     control
 }
@@ -42,7 +47,7 @@ fn run_command(args: &RunArgs) -> Result<ExitCode, Error> {
     let settings = args.settings.settings()?;
     let job = Job { inputs: args.inputs.clone(), out: args.out.clone(), settings, force: args.force };
     let progress = reporter(args.log);
-    let outcome = run(&job, &*progress, &control())?;
+    let outcome = run(&job, &*progress, &control(&*progress, args.log))?;
     progress.note(&format!(
         "{} grains and {} oversize bodies in {}; {:.2} triangles segmented for each of the survey",
         outcome.catalogue.grains.len(),
@@ -65,28 +70,33 @@ fn inspect_command(args: &InspectArgs) -> Result<ExitCode, Error> {
     };
     let inspection = gravelometer::inspect::inspect(&args.inputs, &input)?;
     if args.json {
-        println!("{}", serde_json::to_string_pretty(&inspection).expect("plain numbers and texts"));
+        print(&serde_json::to_string_pretty(&inspection).expect("plain numbers and texts"));
     } else {
-        println!("{inspection}");
+        print(&inspection.to_string());
     }
     Ok(ExitCode::Done)
 }
 
 fn settings_command(args: &SettingArgs) -> Result<ExitCode, Error> {
     let settings = args.settings()?;
-    print!("{}", toml::to_string(&settings).expect("plain numbers and texts"));
+    print(&toml::to_string(&settings).expect("plain numbers and texts"));
     Ok(ExitCode::Done)
 }
 
 fn demo_command(args: &DemoArgs) -> Result<ExitCode, Error> {
     let what = Demonstration { out: args.out.clone(), seed: args.seed, threads: args.threads, force: args.force };
     let progress = reporter(args.log);
-    let shown = demonstrate(&what, &*progress, &control())?;
-    println!("{}", shown.score);
-    println!("\nThe scene, what is in it, and the results:");
+    let shown = demonstrate(&what, &*progress, &control(&*progress, args.log))?;
+    print(&shown.score.to_string());
+    print("\nThe scene, what is in it, and the results:");
     for file in shown.files.iter().chain(&shown.outcome.files) {
-        println!("  {}", file.display());
+        print(&format!("  {}", file.display()));
     }
-    println!("Look at grains.png (true stones outlined in black), or open grains.gpkg in QGIS.");
+    print("Look at grains.png (true stones outlined in black), or open grains.gpkg in QGIS.");
     Ok(if shown.outcome.lost.is_empty() { ExitCode::Done } else { ExitCode::DoneWithLosses })
+}
+
+/// A text on standard output. That nobody reads it (`| head`) is no failure.
+fn print(text: &str) {
+    let _ = writeln!(std::io::stdout().lock(), "{}", text.trim_end_matches('\n'));
 }

@@ -44,8 +44,10 @@ impl Survey<'_> {
         self.index.triangles.count(&self.index.grid, block)
     }
 
-    fn core_vertices(&self, tile: &Tile) -> (Vec<u64>, Vec<DVec3>) {
-        let ids = self.index.vertices.in_block(&self.index.grid, &tile.core);
+    /// Vertices of the core that pass the filter: ids, and positions in local metres.
+    fn core_vertices(&self, tile: &Tile, filter: &(dyn Fn(u64) -> bool + Sync)) -> (Vec<u64>, Vec<DVec3>) {
+        let mut ids = self.index.vertices.in_block(&self.index.grid, &tile.core);
+        ids.retain(|&v| filter(v));
         let points = ids.iter().map(|&v| self.surface.position(v)).collect();
         (ids, points)
     }
@@ -60,7 +62,7 @@ impl Survey<'_> {
         let (mut sum, mut count) = (ExactSum::ZERO, 0u64);
         progress.begin("spacing", self.index.scale.vertices, Unit::Vertices);
         let nearest = |field: &NormalField, points: &[DVec3]| nearest_centroid_m(field, points, side_m);
-        let lost = self.per_vertex(crew, 3.0 * side_m, &nearest, |_, values| {
+        let lost = self.per_vertex(crew, 3.0 * side_m, (&nearest, &|_| true), |_, values| {
             values.iter().for_each(|&d| sum.add(d));
             count += values.len() as u64;
             progress.advance(values.len() as u64);
@@ -69,7 +71,7 @@ impl Survey<'_> {
         Ok(Pass { result: sum.value() / count.max(1) as f64, lost })
     }
 
-    /// Divergence of the normal field at every vertex of the survey, by vertex id, 1/m.
+    /// Divergence of the normal field at every vertex that a triangle uses, by vertex id, 1/m; 0 for others.
     ///
     /// # Errors
     /// When interrupted.
@@ -82,7 +84,9 @@ impl Survey<'_> {
         let mut result = vec![0.0; self.index.scale.vertices as usize];
         progress.begin("curvature", self.index.scale.vertices, Unit::Vertices);
         let values = |field: &NormalField, points: &[DVec3]| divergence(field, points, stencil);
-        let lost = self.per_vertex(crew, stencil.reach_m(), &values, |ids, values| {
+        // Nobody asks for the curvature of a vertex that no triangle uses, and a stray one may be far away.
+        let used = |v: u64| self.index.valence[v as usize] > 0;
+        let lost = self.per_vertex(crew, stencil.reach_m(), (&values, &used), |ids, values| {
             ids.iter().zip(&values).for_each(|(&v, &d)| result[v as usize] = d);
             progress.advance(values.len() as u64);
         })?;
@@ -90,12 +94,13 @@ impl Survey<'_> {
         Ok(Pass { result, lost })
     }
 
-    /// One value for every vertex of every core, from a halo that is widened until it is certain.
+    /// One value for every vertex of every core that passes the filter, from a halo that is widened until it
+    /// is certain.
     fn per_vertex(
         &self,
         crew: &Crew,
         halo_m: f64,
-        values: &PointValues,
+        (values, filter): (&PointValues, &(dyn Fn(u64) -> bool + Sync)),
         mut collect: impl FnMut(&[u64], Vec<f64>),
     ) -> Result<Vec<LostJob>, Interrupted> {
         let first = |job: usize| self.with_halo(&self.tile(job).core, halo_m);
@@ -103,7 +108,7 @@ impl Survey<'_> {
             footprint_bytes: |job| NormalField::footprint_bytes(self.triangles_in(&first(job))),
             load: |job| NormalField::load(self.surface, self.index, &first(job)),
             work: |job, field: NormalField, reservation: &mut Reservation| {
-                let (ids, points) = self.core_vertices(self.tile(job));
+                let (ids, points) = self.core_vertices(self.tile(job), filter);
                 let mut found = values(&field, &points);
                 drop(field);
                 let mut wider_m = halo_m;
@@ -184,6 +189,8 @@ impl Survey<'_> {
             attempts += 1;
             let block = self.with_halo(&tile.core, halo_m);
             reservation.grow_to(TileMesh::footprint_bytes(self.triangles_in(&block)));
+            // The narrower mesh goes before the wider one comes.
+            drop(std::mem::take(&mut mesh));
             mesh = TileMesh::load(self.surface, self.index, &tile.core, &block);
         }
     }

@@ -10,9 +10,10 @@ use crate::pipeline::{Budget, Control, Crew, LostJob, memory_there_bytes};
 use crate::progress::{Progress, Unit};
 use crate::segment::smallest_grain_area_m2;
 use crate::settings::Settings;
+use crate::statistics::RasterGrid;
 use crate::stitch::{Catalogue, TileReport, stitch};
 use crate::tile::Plan;
-use crate::write::{OutputFolder, Results, WholeMesh, write_all};
+use crate::write::{OutputFolder, Results, WholeMesh, WriteError, write_all};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -56,7 +57,8 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let crew = crew(settings, control)?;
 
     // open
-    let (reach, warnings) = open(job, progress)?;
+    let (reach, warnings) = crew.pool.install(|| open(job, progress))?;
+    control.check()?;
     let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
     warnings.iter().for_each(|w| progress.warn(w));
 
@@ -65,6 +67,8 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let mut index = crew.pool.install(|| Index::build(&reach))?;
     progress.advance(reach.triangles());
     progress.end();
+    control.check()?;
+    check_outputs(&reach, &index, settings)?;
 
     // plan
     let plan = plan(&index, settings, &crew);
@@ -86,7 +90,8 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let wanted = Wanted { outline_step_m, triangle_ids: settings.output.labelled_mesh };
     let recipe = Recipe { settings: &settings.segment, divergence: &divergence, wanted };
     let found = survey.grains(&crew, &recipe, progress)?;
-    found.lost.iter().for_each(|lost| progress.warn(&format!("tile {} is lost: {}", lost.job, lost.message)));
+    let tile = |lost: &LostJob| plan.tiles[lost.job].id;
+    found.lost.iter().for_each(|lost| progress.warn(&format!("tile {} is lost: {}", tile(lost), lost.message)));
 
     // stitch
     let touch_steps = (TOUCH_EDGES * index.scale.mean_edge_m / outline_step_m) as i64;
@@ -144,11 +149,25 @@ fn open(job: &Job, progress: &dyn Progress) -> Result<(Reach, Vec<crate::open::W
 fn plan(index: &Index, settings: &Settings, crew: &Crew) -> Plan {
     let tile_size_m = if settings.work.tile_size_m > 0.0 {
         settings.work.tile_size_m
+    } else if settings.segment.max_grain_m == 0.0 {
+        // Every tile would have to see the whole survey: one tile does it once.
+        f64::MAX
     } else {
         let halo_m = settings.segment.max_grain_m;
         Plan::size_for_budget(index, halo_m, crew.budget.total_bytes(), crew.pool.current_num_threads())
     };
     Plan::new(index, tile_size_m)
+}
+
+/// Refuses what cannot be written before the long work begins.
+fn check_outputs(reach: &Reach, index: &Index, settings: &Settings) -> Result<(), Error> {
+    if settings.raster.cell_m > 0.0 {
+        RasterGrid::new(reach.frame(), &index.scale, settings.raster.cell_m)?;
+    }
+    if settings.output.labelled_mesh && reach.vertices() > u64::from(u32::MAX) {
+        return Err(WriteError::TooManyVertices { vertices: reach.vertices() }.into());
+    }
+    Ok(())
 }
 
 /// A pass on which everything depends: none of its tiles may be lost.

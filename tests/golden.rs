@@ -113,11 +113,12 @@ fn agrees_with_the_authors(name: &str, ambiguous_vertices: usize) {
     let flips = (0..div.len()).filter(|&v| (div[v] < 0.0) != (g.div[v] < 0.0)).count();
     println!("{name}: {} vertices off by more than 1e-9 ({off:?}), worst {worst:.2e}, {flips} signs differ", off.len());
     assert!(off.len() <= ambiguous_vertices, "divergence differs at {off:?}");
+    assert_eq!(flips, 0, "signs that differ");
 
     let mesh = whole(&g);
     let scale: Scale = g.index.scale;
     let mut differences = BTreeMap::new();
-    let settled = segment(&mesh, &g.div, &scale, &preset().segment, &mut |step, state| {
+    let settled = segment(&mesh, &div, &scale, &preset().segment, &mut |step, state| {
         let stage = match step {
             Step::Concave => "s0_concave".to_owned(),
             Step::Dents => "s1_smallconcave".to_owned(),

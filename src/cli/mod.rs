@@ -2,7 +2,7 @@
 
 mod report;
 
-pub use report::reporter;
+pub use report::{report_error, reporter};
 
 use crate::settings::{Settings, SettingsError, Unit};
 use clap::{Args, Parser, Subcommand, ValueEnum};

@@ -3,7 +3,7 @@
 use super::Log;
 use crate::progress::{Progress, Unit};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -14,6 +14,19 @@ pub fn reporter(log: Log) -> Box<dyn Progress> {
         Log::Text if std::io::stderr().is_terminal() => Box::new(Bars { bar: Mutex::default() }),
         Log::Text => Box::new(Lines { json: false, stage: Mutex::default() }),
     }
+}
+
+/// Why a command failed, in the style of its log.
+pub fn report_error(log: Log, error: &crate::error::Error) {
+    match log {
+        Log::Json => say(&serde_json::json!({ "event": "error", "text": error.to_string() }).to_string()),
+        Log::Text => say(&format!("error: {error}")),
+    }
+}
+
+/// A line on standard error. That nobody reads it is no reason to stop.
+fn say(line: &str) {
+    let _ = writeln!(std::io::stderr().lock(), "{line}");
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -28,8 +41,8 @@ struct Bars {
 impl Bars {
     fn say(&self, text: &str) {
         match &*lock(&self.bar) {
-            Some(bar) => bar.suspend(|| eprintln!("{text}")),
-            None => eprintln!("{text}"),
+            Some(bar) => bar.suspend(|| say(text)),
+            None => say(text),
         }
     }
 }
@@ -93,26 +106,26 @@ impl Lines {
                 "event": event, "stage": stage.name, "done": stage.done, "total": stage.total,
                 "unit": stage.unit.name(), "seconds": (seconds * 1e3).round() / 1e3,
             });
-            eprintln!("{line}");
+            say(&line.to_string());
             return;
         }
         let Stage { name, done, total, unit, .. } = stage;
         match event {
             "begin" => {}
-            "end" => eprintln!("{name}: {done} {} in {seconds:.1} s", unit.name()),
+            "end" => say(&format!("{name}: {done} {} in {seconds:.1} s", unit.name())),
             _ => {
                 let rate = *done as f64 / seconds.max(1e-9);
                 let left = total.saturating_sub(*done) as f64 / rate.max(1e-9);
-                eprintln!("{name}: {done} of {total} {}, {rate:.0} a second, {left:.0} s left", unit.name());
+                say(&format!("{name}: {done} of {total} {}, {rate:.0} a second, {left:.0} s left", unit.name()));
             }
         }
     }
 
     fn say(&self, level: &'static str, text: &str) {
         match (self.json, level) {
-            (true, _) => eprintln!("{}", serde_json::json!({ "event": level, "text": text })),
-            (false, "warning") => eprintln!("warning: {text}"),
-            (false, _) => eprintln!("{text}"),
+            (true, _) => say(&format!("{}", serde_json::json!({ "event": level, "text": text }))),
+            (false, "warning") => say(&format!("warning: {text}")),
+            (false, _) => say(text),
         }
     }
 }

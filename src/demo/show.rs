@@ -11,6 +11,8 @@ use std::path::{Path, PathBuf};
 
 /// Width of the pictures, pixels.
 const PICTURE_PX: usize = 1200;
+/// The files of the scene, beside the folder of results.
+const FILES: [&str; 4] = ["scene.ply", "scene_truth.csv", "scene.png", "grains.png"];
 const SAND: [u8; 3] = [214, 206, 190];
 
 /// What to demonstrate.
@@ -48,6 +50,12 @@ pub enum DemoError {
         /// Why.
         source: std::io::Error,
     },
+    /// The folder holds an earlier demonstration, or somebody's own files.
+    #[error("{}: is there already\nhelp: name another folder with --out, or use --force to replace it", path.display())]
+    Occupied {
+        /// The first of them.
+        path: PathBuf,
+    },
     /// A picture cannot be written.
     #[error(transparent)]
     Picture(#[from] PictureError),
@@ -58,6 +66,11 @@ pub enum DemoError {
 /// # Errors
 /// Those of the run; files of the scene that cannot be written.
 pub fn demonstrate(what: &Demonstration, progress: &dyn Progress, control: &Control) -> Result<Shown, Error> {
+    if !what.force
+        && let Some(name) = FILES.into_iter().chain(["results"]).find(|name| what.out.join(name).exists())
+    {
+        return Err(DemoError::Occupied { path: what.out.join(name) }.into());
+    }
     progress.note("making a gravel bed with known pebbles");
     let scene = make_scene(&SceneSettings { seed: what.seed, ..SceneSettings::default() });
     let path = |name: &str| what.out.join(name);
@@ -85,7 +98,7 @@ pub fn demonstrate(what: &Demonstration, progress: &dyn Progress, control: &Cont
     let axes = |id: i64| outcome.catalogue.grains.get(id as usize - 1).map(|g| g.grain.axes_m);
     let score = score(&scene, &grain_of_triangle, &axes, MIN_GRAIN_AREA_M2);
     draw(&scene, &grain_of_triangle, &path("scene.png"), &path("grains.png"))?;
-    let files = ["scene.ply", "scene_truth.csv", "scene.png", "grains.png"].map(path).to_vec();
+    let files = FILES.map(path).to_vec();
     Ok(Shown { score, outcome, files })
 }
 

@@ -1,6 +1,7 @@
 //! Convex hulls, by `parry3d-f64`.
 
 use super::DVec3;
+use parry3d_f64::transformation::{ConvexHullError, try_convex_hull};
 
 /// Area and volume of a convex hull. Flat points have a hull of two sides and no volume; fewer than three
 /// points, or points on a line, have neither.
@@ -17,8 +18,10 @@ pub struct Hull {
 /// Points well inside the hull of a few extreme ones cannot be corners and are left out first: the library
 /// takes time with the product of points and corners. The result depends on the order of the points in its
 /// last bits: give them by ascending vertex id.
-pub fn hull(points: &[DVec3]) -> Hull {
-    let Some(&first) = points.first() else { return Hull::default() };
+///
+/// None where the library gives up for rounding, which is not known to happen to grains.
+pub fn hull(points: &[DVec3]) -> Option<Hull> {
+    let Some(&first) = points.first() else { return Some(Hull::default()) };
     let relative: Vec<DVec3> = points.iter().map(|&p| p - first).collect();
     let outside = match Core::of(&relative) {
         Some(core) => {
@@ -27,7 +30,12 @@ pub fn hull(points: &[DVec3]) -> Hull {
         }
         None => relative,
     };
-    Polytope::around(&outside).map(|p| p.hull()).unwrap_or_default()
+    match Polytope::around(&outside) {
+        Ok(polytope) => Some(polytope.hull()),
+        // Too few points, or all on a line.
+        Err(ConvexHullError::IncompleteInput | ConvexHullError::MissingSupportPoint) => Some(Hull::default()),
+        Err(_) => None,
+    }
 }
 
 /// Whether the convex hull of some points is less spherical than a threshold, see [`sphericity`].
@@ -48,8 +56,8 @@ pub fn flatter_than(points: &[DVec3], threshold: f64) -> bool {
             return true;
         }
     }
-    let exact = hull(points);
-    sphericity(exact.volume_m3, exact.area_m2) < threshold
+    // A body whose hull cannot be made is kept: nothing says that it is flat.
+    hull(points).is_some_and(|exact| sphericity(exact.volume_m3, exact.area_m2) < threshold)
 }
 
 /// Directions in which extreme points are looked for.
@@ -76,7 +84,7 @@ impl Core {
         chosen.sort_unstable();
         chosen.dedup();
         let extremes: Vec<DVec3> = chosen.into_iter().map(|i| points[i]).collect();
-        let polytope = Polytope::around(&extremes)?;
+        let polytope = Polytope::around(&extremes).ok()?;
         let radius = extremes.iter().map(|p| p.length()).fold(0.0, f64::max);
         if polytope.hull().volume_m3 <= 1e-9 * radius.powi(3) {
             return None;
@@ -121,9 +129,9 @@ struct Polytope {
 }
 
 impl Polytope {
-    fn around(points: &[DVec3]) -> Option<Polytope> {
-        let (corners, faces) = parry3d_f64::transformation::try_convex_hull(points).ok()?;
-        Some(Polytope { corners, faces })
+    fn around(points: &[DVec3]) -> Result<Polytope, ConvexHullError> {
+        let (corners, faces) = try_convex_hull(points)?;
+        Ok(Polytope { corners, faces })
     }
 
     fn hull(&self) -> Hull {
@@ -184,14 +192,14 @@ mod tests {
         let points: Vec<DVec3> = (0..8)
             .map(|i| DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1) * 2.0, f64::from(i >> 2) * 3.0))
             .collect();
-        let hull = hull(&points);
+        let hull = hull(&points).expect("hull");
         assert!((hull.area_m2 - 22.0).abs() < 1e-12 && (hull.volume_m3 - 6.0).abs() < 1e-12, "{hull:?}");
     }
 
     #[test]
     fn a_flat_sheet_has_two_sides_and_no_sphericity() {
         let points: Vec<DVec3> = (0..100).map(|i| DVec3::new(f64::from(i % 10), f64::from(i / 10), 0.5)).collect();
-        let hull = hull(&points);
+        let hull = hull(&points).expect("hull");
         assert!((hull.area_m2 - 162.0).abs() < 1e-9 && hull.volume_m3 == 0.0, "{hull:?}");
         assert_eq!(sphericity(hull.volume_m3, hull.area_m2), 0.0);
     }
@@ -212,7 +220,7 @@ mod tests {
         for height in [0.05, 0.5, 1.0, 3.0] {
             let points = dome(height);
             let all = Polytope::around(&points).expect("solid").hull();
-            let fast = hull(&points);
+            let fast = hull(&points).expect("hull");
             assert!((fast.area_m2 / all.area_m2 - 1.0).abs() < 1e-12, "{fast:?} {all:?}");
             assert!((fast.volume_m3 / all.volume_m3 - 1.0).abs() < 1e-12, "{fast:?} {all:?}");
         }
@@ -222,7 +230,7 @@ mod tests {
     fn bounds_decide_as_the_hull_does_and_hold_it_between_them() {
         for height in [0.05, 0.1, 0.2, 0.3, 0.5, 1.0] {
             let points = dome(height);
-            let exact = hull(&points);
+            let exact = hull(&points).expect("hull");
             let core = Core::of(&points).expect("solid");
             let outer = core.polytope.grown(core.heights.iter().fold(0.0, |most, &h| h.max(most)));
             let inner = core.polytope.hull();
@@ -248,7 +256,7 @@ mod tests {
     #[test]
     fn points_on_a_line_have_no_hull() {
         let points: Vec<DVec3> = (0..5).map(|i| DVec3::splat(f64::from(i))).collect();
-        assert_eq!(hull(&points).volume_m3, 0.0);
-        assert_eq!(hull(&[]), Hull::default());
+        assert_eq!(hull(&points).expect("hull").volume_m3, 0.0);
+        assert_eq!(hull(&[]), Some(Hull::default()));
     }
 }

@@ -64,8 +64,8 @@ pub fn triangle_normal(corners: [DVec3; 3]) -> DVec3 {
 /// A sum that does not depend on the order of its terms.
 ///
 /// Terms are truncated to multiples of 2^-64 and added as integers, so that survey-wide means are the
-/// same bits whatever the tiling, the thread count or the order of the file. Terms must be finite and
-/// below 2^20 in magnitude; then 2^43 of them fit, more than any survey has triangles.
+/// same bits whatever the tiling, the thread count or the order of the file. Terms must be finite;
+/// their sum must stay below 2^62, far above the area of a survey that is at most 100 km wide.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct ExactSum(i128);
 

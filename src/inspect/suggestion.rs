@@ -5,8 +5,10 @@
 //! most likely made from a laser scan.
 
 use super::SurfaceFigures;
+use crate::settings::Settings;
 use serde::Serialize;
 use std::f64::consts::PI;
+use std::path::Path;
 
 /// Triangles that the smallest measurable grain needs.
 const SMALLEST_GRAIN_TRIANGLES: f64 = 50.0;
@@ -48,13 +50,10 @@ impl Preset {
         }
     }
 
-    /// Widest grain to expect at such a survey, metres.
+    /// Widest grain of the preset, metres.
     fn max_grain_m(self) -> f64 {
-        match self {
-            Preset::Sandbox => 0.25,
-            Preset::Mast => 1.0,
-            Preset::Drone | Preset::LaserScan => 2.0,
-        }
+        let settings = Settings::load(Some(Path::new(self.name())), &[]).unwrap_or_default();
+        settings.segment.max_grain_m
     }
 }
 

@@ -31,9 +31,9 @@ pub struct Grain {
     pub ellipsoid_axes_m: Option<[f64; 3]>,
     /// Summed area of the triangles.
     pub surface_area_m2: f64,
-    /// Area of the convex hull, both sides of a flat one.
+    /// Area of the convex hull, both sides of a flat one; NaN where no hull could be made.
     pub hull_area_m2: f64,
-    /// Volume of the convex hull.
+    /// Volume of the convex hull; NaN likewise.
     pub hull_volume_m3: f64,
     /// Area of the outline in plan.
     pub footprint_area_m2: f64,

@@ -46,7 +46,8 @@ pub fn outline(mesh: &TileMesh, triangles: &[u32], step_m: f64) -> (Vec<Polygon>
     (polygons, twice as f64 / 2.0 * step_m * step_m)
 }
 
-/// A grain wider than 2 km would leave the grid: it is cut off there instead of wrapping round.
+/// A grain that reaches more than 1024 map units from its first corner would leave the grid: it is cut off
+/// there instead of wrapping round.
 fn clamp(x: i64) -> i32 {
     x.clamp(-(1 << 30), 1 << 30) as i32
 }

@@ -1,4 +1,4 @@
-//! Read-only memory maps of the input files: the only unsafe code of the crate.
+//! Read-only memory maps of the input files.
 //!
 //! # Contract
 //! A mapped file must not be truncated or rewritten in place while it is open. The system answers a read

@@ -31,11 +31,9 @@ pub struct Reach {
 const LONGEST_EXTENT_M: f64 = 1e5;
 /// Triangles whose edges are measured to judge unit and precision.
 const SAMPLED_TRIANGLES: u64 = 100_000;
-/// A mean edge above this is too coarse to show gravel, metres.
-const COARSEST_EDGE_M: f64 = 0.2;
-/// An extent in plan above this makes [`COARSEST_EDGE_M`] suspicious, metres. Millimetres of even the
-/// smallest survey exceed it.
-const SUSPICIOUS_EXTENT_M: f64 = 50.0;
+/// A mean edge above the first, over an extent in plan above the second, is rather one of millimetres: too
+/// coarse to show gravel, metres. The finer pair is that of a box of sand scanned at 0.1 mm.
+const LIKE_MILLIMETRES_M: [(f64, f64); 2] = [(0.2, 50.0), (0.05, 200.0)];
 /// A line feed, or a line feed and a carriage return, behind the last record is no finding.
 const TOLERATED_TRAILING_BYTES: u64 = 2;
 
@@ -191,11 +189,10 @@ impl Reach {
         }
         if let Some(first) = self.files.first()
             && input.unit == Unit::Auto
-            && self.frame.crs.is_none()
             && let Some(mean_edge_m) = self.sampled_edge_m(first)
         {
             let extent_m = self.plan_extent_m();
-            if mean_edge_m >= COARSEST_EDGE_M && extent_m > SUSPICIOUS_EXTENT_M {
+            if LIKE_MILLIMETRES_M.iter().any(|&(edge, extent)| mean_edge_m >= edge && extent_m > extent) {
                 warnings.push(Warning::LooksLikeMillimetres { path: name(first), mean_edge_m, extent_m });
             }
         }

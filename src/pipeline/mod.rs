@@ -3,7 +3,7 @@
 //!
 //! ```text
 //!  loader (1 thread) ──bounded──> workers (the pool's threads) ──bounded──> caller, in the jobs' order
-//!      waits for its bytes             may use the pool inside                 frees the bytes
+//!      waits for its bytes        may use the pool inside; frees the bytes
 //! ```
 //!
 //! One thread or many, the caller sees the same results in the same order.
@@ -78,7 +78,7 @@ pub fn over_jobs<D: Send, R: Send>(
         // Results arrive in any order; those that are early wait here.
         let mut early = BTreeMap::new();
         let mut next = 0;
-        for (job, result) in &done_out {
+        for (job, result) in done_out {
             early.insert(job, result);
             while let Some(result) = early.remove(&next) {
                 match result {

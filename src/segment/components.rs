@@ -82,7 +82,7 @@ impl Components {
             // both its ends are incomplete.
             let open = ends.iter().all(|&v| !mesh.complete[v as usize]);
             let doubtful = around.iter().any(|&t| unknown(t as usize));
-            let mesh_edge = around.len() == 1 && !open;
+            let mesh_edge = !open && ends[0] != ends[1] && lone(mesh, around);
             if open || doubtful || mesh_edge {
                 for &t in around {
                     if let Some(part) = self.parts.get_mut(self.of[t as usize] as usize) {
@@ -105,6 +105,23 @@ impl Part {
     fn starting_at(lowest: u32) -> Part {
         Part { lowest, size: 0, bounds: PlanBox::EMPTY, open: false, doubtful: false, at_mesh_edge: false }
     }
+}
+
+/// Whether only one triangle lies at an edge. Faces that name a vertex twice, and copies of a face, do not
+/// count.
+fn lone(mesh: &TileMesh, around: &[u32]) -> bool {
+    let mut only = None;
+    for &t in around {
+        let mut corners = mesh.triangles[t as usize];
+        corners.sort_unstable();
+        if corners[0] == corners[1] || corners[1] == corners[2] {
+            continue;
+        }
+        if *only.get_or_insert(corners) != corners {
+            return false;
+        }
+    }
+    only.is_some()
 }
 
 /// The root is the lowest member, always.

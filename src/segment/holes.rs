@@ -30,7 +30,7 @@ pub fn fill_holes(mesh: &TileMesh, edges: &Edges, sizes: &Sizes, settings: &Segm
         let (only, sure) = contact[pockets.of[t] as usize];
         let wide = settings.max_grain_m > 0.0 && part.bounds.width_m() > settings.max_grain_m;
         let at_edge = part.at_mesh_edge && !settings.fill_edge_holes;
-        if only == SEVERAL || wide || at_edge {
+        if only == SEVERAL || only == OVERSIZE || wide || at_edge {
             continue;
         }
         if !sure || !part.closed() {

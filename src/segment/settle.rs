@@ -46,8 +46,10 @@ pub struct OversizePiece {
 /// Oversize bodies as they stand before dilation, and how many core triangles leave open where one ends.
 pub fn oversize_pieces(mesh: &TileMesh, edges: &Edges, labels: &Labels) -> (Vec<OversizePiece>, u64) {
     let of_body = |t: usize| labels.label[t] == OVERSIZE;
+    // A later step may remove an unknown triangle for sure, but it may be part of a body here.
+    let mut unsettled = unknown_in_core(mesh, labels);
     if !(0..labels.label.len()).any(of_body) {
-        return (Vec::new(), 0);
+        return (Vec::new(), unsettled);
     }
     let bodies = Components::of(mesh, edges, &vec![1; labels.label.len()], of_body, |_| false);
     let mut pieces = vec![OversizePiece::default(); bodies.parts.len()];
@@ -61,12 +63,11 @@ pub fn oversize_pieces(mesh: &TileMesh, edges: &Edges, labels: &Labels) -> (Vec<
         let bounds = piece.bounds.get_or_insert(PlanBox::EMPTY);
         mesh.corners(t as u32).into_iter().for_each(|c| bounds.include(c));
     }
-    let mut unsettled = 0;
     for (ends, around) in edges.iter() {
         let open = ends.iter().all(|&v| !mesh.complete[v as usize]);
         for &inside in around.iter().filter(|&&t| of_body(t as usize) && mesh.in_core[t as usize]) {
-            let unknown = |&&t: &&u32| labels.state[t as usize] == State::Unknown;
-            unsettled += u64::from(open || around.iter().find(unknown).is_some());
+            let unknown = |&t: &u32| labels.state[t as usize] == State::Unknown;
+            unsettled += u64::from(open || around.iter().any(unknown));
             for &outside in around.iter().filter(|&&t| of_body(t as usize) && !mesh.in_core[t as usize]) {
                 pieces[bodies.of[inside as usize] as usize]
                     .crossings
@@ -76,6 +77,11 @@ pub fn oversize_pieces(mesh: &TileMesh, edges: &Edges, labels: &Labels) -> (Vec<
     }
     pieces.retain(|p| p.triangles > 0);
     (pieces, unsettled)
+}
+
+fn unknown_in_core(mesh: &TileMesh, labels: &Labels) -> u64 {
+    let unknown = |t: &usize| mesh.in_core[*t] && labels.state[*t] == State::Unknown;
+    (0..labels.state.len()).filter(unknown).count() as u64
 }
 
 /// Drops small bodies for the last time and sorts out what the core may publish.
@@ -98,8 +104,8 @@ pub fn settle(
         |t| state[t] == State::Kept && labels.label[t] < OVERSIZE,
         |t| state[t] == State::Unknown,
     );
-    let unknown = (0..state.len()).filter(|&t| mesh.in_core[t] && state[t] == State::Unknown).count();
-    let mut settled = Settled { oversize, unsettled: unknown as u64 + open_oversize, ..Settled::default() };
+    let unsettled = unknown_in_core(mesh, labels) + open_oversize;
+    let mut settled = Settled { oversize, unsettled, ..Settled::default() };
     let mut grain_of = vec![NONE; bodies.parts.len()];
     for (part, grain) in bodies.parts.iter().zip(&mut grain_of) {
         if !mesh.in_core[part.lowest as usize] {

@@ -27,7 +27,7 @@ pub struct Oversize {
     pub bounds: PlanBox,
 }
 
-/// How one tile was worked. The only output that depends on the tiling.
+/// How one tile was worked. Of what is found, only this depends on the tiling.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TileReport {
     /// Row-major number of the tile.

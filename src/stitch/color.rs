@@ -8,8 +8,8 @@ type Boxed = GeomWithData<Rectangle<[i64; 2]>, usize>;
 
 /// The smallest colour number that no lower-numbered touching grain has, for grains by ascending anchor.
 ///
-/// Two grains touch when each one's outline has a corner within `touch_steps` of the other's box in plan:
-/// true of every pair of outlines that come so near, and cheap.
+/// Two grains touch when the outline of one has a corner within `touch_steps` of the other's box in plan:
+/// true of every pair of outlines that come so near, of some that do not quite, and cheap.
 pub(super) fn colors(grains: &[Grain], touch_steps: i64) -> Vec<u32> {
     let boxes: Vec<Option<AABB<[i64; 2]>>> = grains.iter().map(|g| grown_box(g, touch_steps)).collect();
     let entries: Vec<Boxed> = boxes
@@ -24,7 +24,7 @@ pub(super) fn colors(grains: &[Grain], touch_steps: i64) -> Vec<u32> {
             .iter()
             .flat_map(|b| tree.locate_in_envelope_intersecting(*b))
             .map(|entry| entry.data)
-            .filter(|&j| j < i && touch(&grains[i], &boxes[j]) && touch(&grains[j], &boxes[i]))
+            .filter(|&j| j < i && (touch(&grains[i], &boxes[j]) || touch(&grains[j], &boxes[i])))
             .map(|j| colors[j])
             .collect();
         taken.sort_unstable();

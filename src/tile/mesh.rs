@@ -8,6 +8,9 @@ use crate::open::Surface;
 /// [`TileMesh`], its edges, labels and components, with a tenth for growth.
 pub const BYTES_PER_TRIANGLE: u64 = 240;
 
+/// Local numbers of half-edges, three for each triangle, must fit 32 bits.
+const MOST_TRIANGLES: usize = 1 << 30;
+
 /// Part of the survey: all triangles whose centroid lies in a block of cells, with their vertices.
 ///
 /// Local numbers ascend with global ids, so that "lowest local number" and "lowest global id" agree.
@@ -33,6 +36,11 @@ impl TileMesh {
     /// Loads a block of cells; `core` says what of it is owned.
     pub fn load(surface: &dyn Surface, index: &Index, core: &CellBlock, block: &CellBlock) -> TileMesh {
         let triangle_ids = index.triangles.in_block(&index.grid, block);
+        assert!(
+            triangle_ids.len() <= MOST_TRIANGLES,
+            "a tile of {} triangles; at most {MOST_TRIANGLES} can be worked at once: set --max-grain or --tile-size",
+            triangle_ids.len()
+        );
         let global: Vec<[u64; 3]> = triangle_ids.iter().map(|&t| surface.triangle(t)).collect();
         let mut vertex_ids: Vec<u64> = global.iter().flatten().copied().collect();
         vertex_ids.sort_unstable();

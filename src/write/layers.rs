@@ -4,6 +4,7 @@ use super::columns::{COLUMNS, Kind, Row, Value};
 use super::{Results, wkb};
 use crate::geometry::PlanBox;
 use crate::open::Frame;
+use crate::settings::{Settings, WorkSettings};
 use gdal::vector::OGRwkbGeometryType;
 use std::borrow::Cow;
 
@@ -143,7 +144,9 @@ fn survey<'a>(results: &'a Results<'a>) -> Layer<'a> {
 
 fn survey_feature(results: &Results) -> Feature {
     let (frame, scale): (&Frame, _) = (results.frame, results.scale);
-    let settings = serde_json::to_string(results.settings).unwrap_or_default();
+    // How the work was cut changes no result, so it has no place in what must not depend on it.
+    let settings = Settings { work: WorkSettings::default(), ..results.settings.clone() };
+    let settings = serde_json::to_string(&settings).unwrap_or_default();
     let offset = frame.offset_map.map(Value::Position);
     let mut values = vec![
         Value::Text(Cow::Borrowed(env!("CARGO_PKG_NAME"))),
