@@ -82,7 +82,8 @@ impl Survey<'_> {
         progress: &dyn Progress,
     ) -> Result<Pass<Vec<f64>>, Interrupted> {
         let mut result = vec![0.0; self.index.scale.vertices as usize];
-        progress.begin("curvature", self.index.scale.vertices, Unit::Vertices);
+        let in_use = self.index.valence.iter().filter(|&&n| n > 0).count() as u64;
+        progress.begin("curvature", in_use, Unit::Vertices);
         let values = |field: &NormalField, points: &[DVec3]| divergence(field, points, stencil);
         // Nobody asks for the curvature of a vertex that no triangle uses, and a stray one may be far away.
         let used = |v: u64| self.index.valence[v as usize] > 0;
