@@ -70,7 +70,8 @@ impl Error {
     /// The exit code that fits.
     pub fn exit_code(&self) -> ExitCode {
         match self {
-            Error::Settings(_) => ExitCode::Usage,
+            Error::Settings(_) | Error::Raster(_) => ExitCode::Usage,
+            Error::Open(open) if open.is_about_settings() => ExitCode::Usage,
             Error::Interrupted(_) => ExitCode::Interrupted,
             _ => ExitCode::Failed,
         }

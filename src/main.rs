@@ -96,7 +96,13 @@ fn demo_command(args: &DemoArgs) -> Result<ExitCode, Error> {
     Ok(if shown.outcome.lost.is_empty() { ExitCode::Done } else { ExitCode::DoneWithLosses })
 }
 
-/// A text on standard output. That nobody reads it (`| head`) is no failure.
+/// A text on standard output. That nobody reads it (`| head`) is no failure; a full disk is.
 fn print(text: &str) {
-    let _ = writeln!(std::io::stdout().lock(), "{}", text.trim_end_matches('\n'));
+    let written = writeln!(std::io::stdout().lock(), "{}", text.trim_end_matches('\n'));
+    if let Err(error) = written
+        && error.kind() != std::io::ErrorKind::BrokenPipe
+    {
+        let _ = writeln!(std::io::stderr().lock(), "error: cannot write to standard output: {error}");
+        std::process::exit(ExitCode::Failed as i32);
+    }
 }

@@ -44,25 +44,30 @@ impl Survey<'_> {
         self.index.triangles.count(&self.index.grid, block)
     }
 
-    /// Vertices of the core that pass the filter: ids, and positions in local metres.
-    fn core_vertices(&self, tile: &Tile, filter: &(dyn Fn(u64) -> bool + Sync)) -> (Vec<u64>, Vec<DVec3>) {
+    fn vertices_in_use(&self) -> u64 {
+        self.index.valence.iter().filter(|&&n| n > 0).count() as u64
+    }
+
+    /// Vertices of the core that triangles use: ids, and positions in local metres. A stray one may be far
+    /// away, and nobody asks for its curvature.
+    fn core_vertices(&self, tile: &Tile) -> (Vec<u64>, Vec<DVec3>) {
         let mut ids = self.index.vertices.in_block(&self.index.grid, &tile.core);
-        ids.retain(|&v| filter(v));
+        ids.retain(|&v| self.index.valence[v as usize] > 0);
         let points = ids.iter().map(|&v| self.surface.position(v)).collect();
         (ids, points)
     }
 
-    /// Mean distance from a vertex to the nearest triangle centroid, over all vertices of the survey,
-    /// metres; an exact mean.
+    /// Mean distance from a vertex to the nearest triangle centroid, over all vertices that triangles
+    /// use, metres; an exact mean.
     ///
     /// # Errors
     /// When interrupted.
     pub fn spacing(&self, crew: &Crew, progress: &dyn Progress) -> Result<Pass<f64>, Interrupted> {
         let side_m = self.index.scale.mean_triangle_area_m2.sqrt();
         let (mut sum, mut count) = (ExactSum::ZERO, 0u64);
-        progress.begin("spacing", self.index.scale.vertices, Unit::Vertices);
+        progress.begin("spacing", self.vertices_in_use(), Unit::Vertices);
         let nearest = |field: &NormalField, points: &[DVec3]| nearest_centroid_m(field, points, side_m);
-        let lost = self.per_vertex(crew, 3.0 * side_m, (&nearest, &|_| true), |_, values| {
+        let lost = self.per_vertex(crew, 3.0 * side_m, &nearest, |_, values| {
             values.iter().for_each(|&d| sum.add(d));
             count += values.len() as u64;
             progress.advance(values.len() as u64);
@@ -82,12 +87,9 @@ impl Survey<'_> {
         progress: &dyn Progress,
     ) -> Result<Pass<Vec<f64>>, Interrupted> {
         let mut result = vec![0.0; self.index.scale.vertices as usize];
-        let in_use = self.index.valence.iter().filter(|&&n| n > 0).count() as u64;
-        progress.begin("curvature", in_use, Unit::Vertices);
+        progress.begin("curvature", self.vertices_in_use(), Unit::Vertices);
         let values = |field: &NormalField, points: &[DVec3]| divergence(field, points, stencil);
-        // Nobody asks for the curvature of a vertex that no triangle uses, and a stray one may be far away.
-        let used = |v: u64| self.index.valence[v as usize] > 0;
-        let lost = self.per_vertex(crew, stencil.reach_m(), (&values, &used), |ids, values| {
+        let lost = self.per_vertex(crew, stencil.reach_m(), &values, |ids, values| {
             ids.iter().zip(&values).for_each(|(&v, &d)| result[v as usize] = d);
             progress.advance(values.len() as u64);
         })?;
@@ -95,13 +97,13 @@ impl Survey<'_> {
         Ok(Pass { result, lost })
     }
 
-    /// One value for every vertex of every core that passes the filter, from a halo that is widened until it
-    /// is certain.
+    /// One value for every vertex of every core that triangles use, from a halo that is widened until it is
+    /// certain.
     fn per_vertex(
         &self,
         crew: &Crew,
         halo_m: f64,
-        (values, filter): (&PointValues, &(dyn Fn(u64) -> bool + Sync)),
+        values: &PointValues,
         mut collect: impl FnMut(&[u64], Vec<f64>),
     ) -> Result<Vec<LostJob>, Interrupted> {
         let first = |job: usize| self.with_halo(&self.tile(job).core, halo_m);
@@ -109,7 +111,7 @@ impl Survey<'_> {
             footprint_bytes: |job| NormalField::footprint_bytes(self.triangles_in(&first(job))),
             load: |job| NormalField::load(self.surface, self.index, &first(job)),
             work: |job, field: NormalField, reservation: &mut Reservation| {
-                let (ids, points) = self.core_vertices(self.tile(job), filter);
+                let (ids, points) = self.core_vertices(self.tile(job));
                 let mut found = values(&field, &points);
                 drop(field);
                 let mut wider_m = halo_m;

@@ -54,6 +54,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let settings = &job.settings;
     settings.check()?;
     let folder = OutputFolder::create(&job.out, job.force, &[])?;
+    folder.spare(&job.inputs)?;
     let crew = crew(settings, control)?;
 
     // open

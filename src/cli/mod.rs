@@ -139,6 +139,11 @@ fn offset(text: &str) -> Result<Offset, String> {
     }
 }
 
+/// A number as TOML has it.
+fn number(value: f64) -> String {
+    if value.is_nan() { "nan".into() } else { format!("{value:?}") }
+}
+
 impl SettingArgs {
     /// Defaults, overlaid by the settings file, by `--set`, and by the other flags.
     ///
@@ -151,9 +156,9 @@ impl SettingArgs {
         set("input.crs", self.crs.as_deref().map(word));
         set("input.offset", self.offset.map(|o| format!("{:?}", o.0)));
         set("input.unit", self.unit.and_then(|u| u.to_possible_value().map(|v| word(v.get_name()))));
-        set("segment.max_grain_m", self.max_grain.map(|v| format!("{v:?}")));
-        set("segment.min_grain_area_m2", self.min_grain_area.map(|v| format!("{v:?}")));
-        set("work.tile_size_m", self.tile_size.map(|v| format!("{v:?}")));
+        set("segment.max_grain_m", self.max_grain.map(number));
+        set("segment.min_grain_area_m2", self.min_grain_area.map(number));
+        set("work.tile_size_m", self.tile_size.map(number));
         set("work.threads", self.threads.map(|v| v.to_string()));
         set("work.memory", self.memory.as_deref().map(word));
         set("output.labelled_mesh", self.labelled_mesh.then(|| "true".into()));

@@ -39,7 +39,7 @@ pub struct Index {
     pub grid: CellGrid,
     /// Triangles by the cell of their centroid.
     pub triangles: CellLists,
-    /// Vertices by cell, unused ones included.
+    /// Vertices by cell; those that no triangle uses lie in the nearest.
     pub vertices: CellLists,
     /// How many triangle corners meet at each vertex of the survey. A tile that has loaded as many
     /// knows that it sees all there is around that vertex.
@@ -54,7 +54,13 @@ impl Index {
     /// # Errors
     /// [`IndexError::NoArea`] when no triangle has any area.
     pub fn build(surface: &dyn Surface) -> Result<Index, IndexError> {
-        let scale = figures(surface);
+        let mut valence = vec![0u32; surface.vertices() as usize];
+        for t in 0..surface.triangles() {
+            for v in surface.triangle(t) {
+                valence[v as usize] += 1;
+            }
+        }
+        let scale = figures(surface, &valence);
         if scale.mean_triangle_area_m2 <= 0.0 {
             return Err(IndexError::NoArea { triangles: scale.triangles });
         }
@@ -68,12 +74,6 @@ impl Index {
         let of_vertex: Vec<u32> = (0..scale.vertices).into_par_iter().map(|v| place(surface.position(v))).collect();
         let vertices = CellLists::build(grid.len(), &of_vertex);
         drop(of_vertex);
-        let mut valence = vec![0u32; scale.vertices as usize];
-        for t in 0..scale.triangles {
-            for v in surface.triangle(t) {
-                valence[v as usize] += 1;
-            }
-        }
         Ok(Index { grid, triangles, vertices, valence, scale })
     }
 }
@@ -110,11 +110,11 @@ fn chunks(n: u64) -> impl ParallelIterator<Item = std::ops::Range<u64>> {
     (0..n.div_ceil(CHUNK)).into_par_iter().map(move |c| c * CHUNK..((c + 1) * CHUNK).min(n))
 }
 
-fn figures(surface: &dyn Surface) -> Scale {
+fn figures(surface: &dyn Surface, valence: &[u32]) -> Scale {
     let (vertices, triangles) = (surface.vertices(), surface.triangles());
     let of_vertices = chunks(vertices)
         .map(|range| {
-            range.fold(Sums::NOTHING, |mut sums, v| {
+            range.filter(|&v| valence[v as usize] > 0).fold(Sums::NOTHING, |mut sums, v| {
                 let p = surface.position(v);
                 sums.min = sums.min.min(p);
                 sums.max = sums.max.max(p);

@@ -9,9 +9,9 @@ pub struct Scale {
     pub vertices: u64,
     /// Number of triangles, zero-area ones included.
     pub triangles: u64,
-    /// Lowest corner of the vertices' box, local metres.
+    /// Lowest corner of the box of the vertices that triangles use, local metres.
     pub min: DVec3,
-    /// Highest corner of the vertices' box, local metres.
+    /// Highest corner of the same, local metres.
     pub max: DVec3,
     /// Summed triangle area, m².
     pub surface_area_m2: f64,
@@ -19,7 +19,7 @@ pub struct Scale {
     pub mean_triangle_area_m2: f64,
     /// Mean length of the triangles' edges (an edge counts once per triangle), metres.
     pub mean_edge_m: f64,
-    /// Mean distance from a vertex to the nearest triangle centroid, metres.
+    /// Mean distance from a vertex that triangles use to the nearest triangle centroid, metres.
     pub spacing_m: f64,
     /// Triangles of zero area.
     pub zero_area_triangles: u64,

@@ -15,6 +15,9 @@ pub struct GeoReference {
     pub metres_per_unit: f64,
 }
 
+/// A file with more than this is no description of a coordinate system.
+const LONGEST_WKT_BYTES: u64 = 1 << 20;
+
 /// Units whose published factor is a fraction that WKT rounds.
 const EXACT_UNITS_M: [f64; 3] = [1.0, 0.3048, 1200.0 / 3937.0];
 
@@ -36,6 +39,9 @@ impl GeoReference {
         let path = Path::new(text);
         if !path.exists() {
             return Err(OpenError::CrsForm { text: text.to_owned() });
+        }
+        if !path.metadata().is_ok_and(|m| m.is_file() && m.len() <= LONGEST_WKT_BYTES) {
+            return Err(OpenError::CrsForm { text: shorten(text) });
         }
         let content =
             std::fs::read_to_string(path).map_err(|source| OpenError::CrsFile { path: text.to_owned(), source })?;

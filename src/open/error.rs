@@ -11,6 +11,9 @@ pub enum OpenError {
     /// The path leads nowhere.
     #[error("{path}: there is no such file\nhelp: check the path; a relative path starts at the working directory")]
     Missing { path: String },
+    /// Two of the paths lead to the same file.
+    #[error("{path}: is given twice, so every grain would count twice\nhelp: name each file once")]
+    Twice { path: String },
     /// The path is a directory.
     #[error("{path}: is a directory, not a mesh\nhelp: name the files in it, for instance {path}/*.ply")]
     Directory { path: String },
@@ -136,9 +139,9 @@ pub enum OpenError {
          apart files one by one"
     )]
     Extent { path: String, axis: char, min: f64, max: f64, extent_m: f64, limit_m: f64 },
-    /// Coordinates destroyed by 32-bit floats.
+    /// Coordinates too large for their type.
     #[error(
-        "{path}: coordinates are 32-bit floats as large as {largest}, where they step by {step_m:.3e} m, but the mean \
+        "{path}: coordinates are floating-point numbers as large as {largest}, where they step by {step_m:.3e} m, but the mean \
          edge is only {edge_m:.3e} m long: the surface is destroyed\nhelp: export it again with double coordinates, or \
          shifted to small ones with the shift given as --offset"
     )]
@@ -173,4 +176,18 @@ pub enum OpenError {
          to the directory that holds proj.db, often /usr/share/proj"
     )]
     ProjDatabase { text: String, message: String },
+}
+
+impl OpenError {
+    /// Whether what was asked for is wrong, rather than what is in the files.
+    pub fn is_about_settings(&self) -> bool {
+        matches!(
+            self,
+            OpenError::CrsForm { .. }
+                | OpenError::CrsFile { .. }
+                | OpenError::CrsUnknown { .. }
+                | OpenError::CrsKind { .. }
+                | OpenError::CrsUnits { .. }
+        )
+    }
 }

@@ -7,7 +7,6 @@ use super::mapped::MappedFile;
 use super::ply::PlyMesh;
 use super::precision::{COARSEST_STEP_IN_EDGES, coarsest_step};
 use super::progress::Progress;
-use super::scalar::Scalar;
 use super::survey_file::SurveyFile;
 use super::warning::Warning;
 use crate::geometry::DVec3;
@@ -168,7 +167,7 @@ impl Reach {
     }
 
     fn check_precision(&self) -> Result<(), OpenError> {
-        for file in self.files.iter().filter(|f| f.axis_types().contains(&Scalar::F32)) {
+        for file in &self.files {
             let step = coarsest_step(file.axis_types(), file.input_bounds());
             if let (Some((step, largest)), Some(edge_m)) = (step, self.sampled_edge_m(file)) {
                 let step_m = step * self.frame.metres_per_input_unit;
@@ -223,6 +222,12 @@ impl Reach {
 fn open_files(paths: &[PathBuf], tell: &(dyn Fn(u64, u64) + Sync)) -> Result<Vec<SurveyFile>, OpenError> {
     if paths.is_empty() {
         return Err(OpenError::NoFiles);
+    }
+    let mut real: Vec<(PathBuf, &PathBuf)> =
+        paths.iter().filter_map(|path| path.canonicalize().ok().map(|real| (real, path))).collect();
+    real.sort();
+    if let Some(same) = real.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+        return Err(OpenError::Twice { path: same[1].1.display().to_string() });
     }
     let mapped = paths.iter().map(|path| MappedFile::open(path)).collect::<Result<Vec<_>, _>>()?;
     let progress = Progress::new(mapped.iter().map(|m| m.len() as u64).sum(), tell);

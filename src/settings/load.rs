@@ -134,7 +134,7 @@ impl Settings {
         )?;
         let ratio = self.measure.equant_ratio;
         range("measure.equant_ratio", ratio, ratio.is_finite() && ratio >= 1.0, "must be a finite number, 1 or more")?;
-        range("work.threads", self.work.threads, self.work.threads <= 4096, "must be at most 4096")?;
+        range("work.threads", self.work.threads, self.work.threads <= 1024, "must be at most 1024")?;
         range(
             "work.memory",
             &self.work.memory,
@@ -177,6 +177,20 @@ fn assign(table: &mut toml::Table, assignment: &str) -> Result<(), SettingsError
         .ok_or_else(|| bad("is not a section"))?
         .insert(name.trim().to_owned(), value);
     Ok(())
+}
+
+/// A size as text, also where it was written as a plain number of bytes.
+pub(super) fn size_text<'de, D: serde::Deserializer<'de>>(from: D) -> Result<String, D::Error> {
+    #[derive(serde::Deserialize)]
+    #[serde(untagged)]
+    enum Size {
+        Text(String),
+        Bytes(u64),
+    }
+    Ok(match serde::Deserialize::deserialize(from)? {
+        Size::Text(text) => text,
+        Size::Bytes(bytes) => bytes.to_string(),
+    })
 }
 
 /// Bytes of a size such as `2GiB`, `500MB`, `1000000`; `Some(0)` for the empty text.

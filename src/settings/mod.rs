@@ -185,6 +185,7 @@ pub struct WorkSettings {
     /// Compute threads; 0 for all cores.
     pub threads: usize,
     /// Memory for tiles in flight, as `2GiB`, `500MB` or bytes; empty for half of what is there.
+    #[serde(deserialize_with = "load::size_text")]
     pub memory: String,
 }
 

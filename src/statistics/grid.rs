@@ -10,8 +10,8 @@ use crate::open::Frame;
 
 /// Parts of a map unit in which cells are counted.
 const PARTS: f64 = 1e6;
-/// A raster with more cells than this is refused: seven bands of it would take 11 GB.
-pub(crate) const MOST_CELLS: u64 = 400_000_000;
+/// A raster with more cells than this is refused: seven bands of it would take 1.4 GB.
+pub(crate) const MOST_CELLS: u64 = 50_000_000;
 
 /// A raster that cannot be laid out.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -19,7 +19,7 @@ pub(crate) const MOST_CELLS: u64 = 400_000_000;
 pub enum RasterError {
     /// Far more cells than anybody can use.
     #[error(
-        "raster.cell_m = {cell_m}: the survey ({width_m:.3} m by {height_m:.3} m) would take {columns} by {rows} cells; at most {most} are possible\nhelp: choose a larger raster.cell_m, at least about {enough_m:.3}"
+        "raster.cell_m = {cell_m}: the survey ({width_m:.3} m by {height_m:.3} m) would take {columns} by {rows} cells; at most {most} are possible\nhelp: choose a larger raster.cell_m, at least about {enough_m:.2e}"
     )]
     TooManyCells {
         /// Cell size asked for, metres.
@@ -37,9 +37,11 @@ pub enum RasterError {
         /// A cell size that fits.
         enough_m: f64,
     },
-    /// The cell size is not above a millionth of a map unit.
-    #[error("raster.cell_m = {cell_m}: is below 1e-6 units of the map\nhelp: choose a larger raster.cell_m")]
-    CellTooSmall {
+    /// The cell size is below a millionth of a map unit, or beyond all maps.
+    #[error(
+        "raster.cell_m = {cell_m:e}: must lie between 1e-6 and 1e8 units of the map\nhelp: about ten times the D50 gives each cell enough grains; 0 chooses that"
+    )]
+    CellSize {
         /// Cell size asked for, metres.
         cell_m: f64,
     },
@@ -86,8 +88,8 @@ impl RasterGrid {
         }
         let metres_per_part = frame.metres_per_map_unit / PARTS;
         let cell = (cell_m / metres_per_part).round();
-        if !(1.0..1e15).contains(&cell) {
-            return Err(RasterError::CellTooSmall { cell_m });
+        if !(1.0..1e14).contains(&cell) {
+            return Err(RasterError::CellSize { cell_m });
         }
         let (columns, rows) = cells_of(min, max, cell_m);
         if columns * rows > MOST_CELLS as f64 {
@@ -223,7 +225,7 @@ mod tests {
         assert_eq!(automatic_cell_m(None, &reach), 0.2);
         let long = scale([0.0, 0.0], [100_000.0, 50_000.0]);
         let cell = automatic_cell_m(Some(0.001), &long);
-        assert_eq!(cell, 5.0);
+        assert_eq!(cell, 20.0);
         assert!(RasterGrid::new(&Frame::metres(), &long, cell).is_ok());
     }
 
@@ -233,7 +235,7 @@ mod tests {
         let error = RasterGrid::new(&Frame::metres(), &long, 0.01).expect_err("5e13 cells");
         assert!(error.to_string().starts_with("raster.cell_m = 0.01: "), "{error}");
         let error = RasterGrid::new(&Frame::metres(), &long, 1e-9).expect_err("no cell");
-        assert!(matches!(error, RasterError::CellTooSmall { .. }));
+        assert!(matches!(error, RasterError::CellSize { .. }));
     }
 
     #[test]

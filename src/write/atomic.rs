@@ -4,7 +4,7 @@
 //! disk and renamed. A run that fails leaves what was there before, and nothing else.
 
 use super::WriteError;
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -19,9 +19,13 @@ const SIDECARS: [&str; 6] = ["-journal", "-wal", "-shm", ".aux.xml", ".msk.ovr.t
 const PARTIAL: &str = "partial";
 
 /// A folder that exists and can be written to.
+///
+/// While it is held, no other run can hold it.
 #[derive(Debug)]
 pub struct OutputFolder {
     path: PathBuf,
+    made: bool,
+    _lock: File,
 }
 
 impl OutputFolder {
@@ -30,13 +34,27 @@ impl OutputFolder {
     /// unfinished files of an interrupted run may be there too.
     ///
     /// # Errors
-    /// The path is no folder, or holds something and `force` is false, or cannot be written to.
+    /// The path is no folder or no text, or holds something and `force` is false, or cannot be written to,
+    /// or another run writes to it.
     pub fn create(path: &Path, force: bool, ignoring: &[&str]) -> Result<OutputFolder, WriteError> {
-        if path.exists() && !path.is_dir() {
+        if path.to_str().is_none() {
+            return Err(WriteError::NotText { path: path.to_owned() });
+        }
+        let made = !path.exists();
+        if !made && !path.is_dir() {
             return Err(WriteError::NotAFolder { path: path.to_owned() });
         }
         let folder = |action| move |source| WriteError::Folder { path: path.to_owned(), action, source };
         fs::create_dir_all(path).map_err(folder("make the output folder"))?;
+        let lock = File::open(path).map_err(folder("open the output folder"))?;
+        match lock.try_lock() {
+            Err(TryLockError::WouldBlock) => return Err(WriteError::Busy { path: path.to_owned() }),
+            // A file system without locks: nothing can be told.
+            Err(TryLockError::Error(_)) | Ok(()) => {}
+        }
+        if let Some(name) = OUTPUTS.into_iter().find(|name| path.join(name).is_dir()) {
+            return Err(WriteError::FolderInTheWay { path: path.join(name) });
+        }
         if !force {
             let (ours, others) = contents(path, ignoring).map_err(folder("list the output folder"))?;
             if !ours.is_empty() || others > 0 {
@@ -44,7 +62,24 @@ impl OutputFolder {
             }
         }
         probe(path).map_err(folder("write to the output folder"))?;
-        Ok(OutputFolder { path: path.to_owned() })
+        Ok(OutputFolder { path: path.to_owned(), made, _lock: lock })
+    }
+
+    /// Refuses inputs that a result would replace.
+    ///
+    /// # Errors
+    /// The first input that is, under whatever name, a file that this folder's results are called.
+    pub fn spare(&self, inputs: &[PathBuf]) -> Result<(), WriteError> {
+        for input in inputs {
+            let Ok(real) = input.canonicalize() else { continue };
+            let names = OUTPUTS.into_iter().flat_map(|name| [name.to_owned(), format!("{name}.{PARTIAL}")]);
+            for target in names.map(|name| self.path.join(name)) {
+                if target.canonicalize().is_ok_and(|target| target == real) {
+                    return Err(WriteError::InputInTheWay { input: input.clone(), target });
+                }
+            }
+        }
+        Ok(())
     }
 
     /// The folder.
@@ -98,6 +133,15 @@ impl OutputFolder {
             source,
         })?;
         Ok(published)
+    }
+}
+
+impl Drop for OutputFolder {
+    fn drop(&mut self) {
+        if self.made {
+            // Only an empty folder can be removed: one without results leaves no trace.
+            let _ = fs::remove_dir(&self.path);
+        }
     }
 }
 

@@ -13,6 +13,32 @@ pub enum WriteError {
         /// The path.
         path: PathBuf,
     },
+    /// GDAL takes paths as text.
+    #[error("{path}: the name of the output folder is not valid UTF-8\nhelp: name another output folder", path = path.display())]
+    NotText {
+        /// The path.
+        path: PathBuf,
+    },
+    /// Another run holds the output folder.
+    #[error("{path}: another run is writing its results here\nhelp: wait for it, or name another output folder", path = path.display())]
+    Busy {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A folder has the name of a result.
+    #[error("{path}: is a folder, but a result has this name\nhelp: move it away, or name another output folder", path = path.display())]
+    FolderInTheWay {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// An input would be replaced by a result.
+    #[error("{input}: would be replaced by the result {target}\nhelp: name another output folder", input = input.display(), target = target.display())]
+    InputInTheWay {
+        /// The input, as given.
+        input: PathBuf,
+        /// The result that has its place.
+        target: PathBuf,
+    },
     /// The output folder is not empty and nobody said that it may be overwritten.
     #[error(
         "{path}: holds files already ({found})\nhelp: name another folder, or use --force to replace the results in it; other files are left alone",
