@@ -101,10 +101,12 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     // statistics and write
     let facts = facts(&reach, &index, &plan, &warnings, &found.lost);
     let mesh = WholeMesh::new(&reach);
+    let surveyed = index.triangles.occupied(&index.grid);
     let results = Results {
         frame: reach.frame(),
         settings,
         scale: &index.scale,
+        surveyed: &surveyed,
         catalogue: &catalogue,
         tiles: &tiles,
         smallest_grain_area_m2: smallest_grain_area_m2(&index.scale, &settings.segment),

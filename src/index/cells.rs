@@ -146,6 +146,29 @@ impl CellLists {
         self.spans(grid, block).map(|s| s.len() as u64).sum()
     }
 
+    /// Boxes in plan, local metres, of the runs of cells that hold anything: where the survey is.
+    pub fn occupied(&self, grid: &CellGrid) -> Vec<PlanBox> {
+        let holds = |column: u32, row: u32| {
+            let cell = grid.number([column, row]);
+            self.start[cell + 1] > self.start[cell]
+        };
+        let mut boxes = Vec::new();
+        for row in 0..grid.rows {
+            let mut column = 0;
+            while column < grid.columns {
+                let first = column;
+                while column < grid.columns && holds(column, row) {
+                    column += 1;
+                }
+                if column > first {
+                    boxes.push(grid.outline(&CellBlock { columns: first..column, rows: row..row + 1 }));
+                }
+                column += 1;
+            }
+        }
+        boxes
+    }
+
     /// One run of elements for each row of the block: cells of a row lie side by side.
     fn spans<'a>(&'a self, grid: &'a CellGrid, block: &'a CellBlock) -> impl Iterator<Item = Range<usize>> + 'a {
         let columns = block.columns.clone();

@@ -4,7 +4,7 @@
 //! a map unit (the grid of [`crate::open::Frame::position`]), and the origin is split into whole cells and
 //! a remainder: an offset of whole cells moves the raster and cannot change a value.
 
-use crate::geometry::DVec3;
+use crate::geometry::{DVec3, PlanBox};
 use crate::index::Scale;
 use crate::open::Frame;
 
@@ -155,6 +155,19 @@ impl RasterGrid {
         };
         let (column, row_from_south) = (place(0, self.columns), place(1, self.rows));
         self.index(column, row_from_south)
+    }
+
+    /// Whether each cell, row-major from the north-west, meets any of some boxes in plan (local metres).
+    pub(crate) fn cells_that_meet(&self, boxes: &[PlanBox]) -> Vec<bool> {
+        let mut meets = vec![false; self.cells()];
+        for b in boxes {
+            let at = |corner: [f64; 2]| self.cell_of(DVec3::new(corner[0], corner[1], 0.0));
+            let (low, high) = (at(b.min), at(b.max));
+            for row in high / self.columns..=low / self.columns {
+                meets[row * self.columns + low % self.columns..=row * self.columns + high % self.columns].fill(true);
+            }
+        }
+        meets
     }
 
     /// Index of a cell by its column and its row counted from the south.

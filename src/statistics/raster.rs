@@ -1,9 +1,11 @@
 //! The grain-size raster: percentiles of b, mean, count and cover, cell by cell.
 //!
-//! A grain counts in the cell that holds its centroid; its outline covers every cell that it meets.
+//! A grain counts in the cell that holds its centroid; its outline covers every cell that it meets. Cells
+//! where nothing was surveyed carry no data; cells that were, and hold no grain, carry a count of 0.
 
 use super::grid::{RasterError, RasterGrid, automatic_cell_m};
 use super::percentiles::Sizes;
+use crate::geometry::PlanBox;
 use crate::index::Scale;
 use crate::open::Frame;
 use crate::settings::RasterSettings;
@@ -53,6 +55,7 @@ impl GrainSizeRaster {
         frame: &Frame,
         scale: &Scale,
         settings: &RasterSettings,
+        surveyed: &[PlanBox],
     ) -> Result<GrainSizeRaster, RasterError> {
         let cell_m = if settings.cell_m > 0.0 {
             settings.cell_m
@@ -61,6 +64,7 @@ impl GrainSizeRaster {
             automatic_cell_m(sizes.area_by_number(50.0), scale)
         };
         let grid = RasterGrid::new(frame, scale, cell_m)?;
+        let surveyed = grid.cells_that_meet(surveyed);
         let mut bands = size_bands(catalogue, &grid, settings.min_grains);
         bands.push(Band {
             name: "grain_cover",
@@ -68,6 +72,10 @@ impl GrainSizeRaster {
             description: "share of the cell covered by grain outlines in plan, 0 to 1",
             values: cover(catalogue, frame, &grid),
         });
+        // No grains and no survey are different things.
+        for band in &mut bands {
+            band.values.iter_mut().zip(&surveyed).filter(|(_, there)| !**there).for_each(|(v, _)| *v = NODATA);
+        }
         Ok(GrainSizeRaster { grid, min_grains: settings.min_grains, bands })
     }
 }

@@ -28,6 +28,7 @@ pub use error::WriteError;
 pub use labelled_mesh::MeshSource;
 pub use source::WholeMesh;
 
+use crate::geometry::PlanBox;
 use crate::index::Scale;
 use crate::open::Frame;
 use crate::settings::Settings;
@@ -44,6 +45,8 @@ pub struct Results<'a> {
     pub settings: &'a Settings,
     /// The survey's scale.
     pub scale: &'a Scale,
+    /// Boxes in plan, local metres, that hold all of the survey and little else.
+    pub surveyed: &'a [PlanBox],
     /// Grains and oversize bodies. For a labelled mesh the grains carry their triangles.
     pub catalogue: &'a Catalogue,
     /// How each tile was worked.
@@ -62,7 +65,13 @@ pub struct Results<'a> {
 /// Anything that keeps a file from being complete; then none of the final names has been touched, except
 /// where renaming itself fails.
 pub fn write_all(out: &OutputFolder, results: &Results, progress: &dyn Fn(&str)) -> Result<Vec<PathBuf>, WriteError> {
-    let raster = GrainSizeRaster::new(results.catalogue, results.frame, results.scale, &results.settings.raster)?;
+    let raster = GrainSizeRaster::new(
+        results.catalogue,
+        results.frame,
+        results.scale,
+        &results.settings.raster,
+        results.surveyed,
+    )?;
     let summary = Summary::new(results.catalogue, results.settings, results.scale, results.smallest_grain_area_m2);
     let names: Vec<&str> =
         OUTPUTS.into_iter().filter(|&name| name != "labelled_mesh.ply" || results.mesh.is_some()).collect();

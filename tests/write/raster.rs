@@ -5,7 +5,8 @@ use gravelometer::statistics::{GrainSizeRaster, NODATA};
 use gravelometer::write::{OutputFolder, write_all};
 
 fn raster(survey: &Survey) -> GrainSizeRaster {
-    GrainSizeRaster::new(&survey.catalogue, &survey.frame, &survey.scale, &survey.settings.raster).expect("raster")
+    GrainSizeRaster::new(&survey.catalogue, &survey.frame, &survey.scale, &survey.settings.raster, &survey.surveyed)
+        .expect("raster")
 }
 
 fn band<'a>(raster: &'a GrainSizeRaster, name: &str) -> &'a [f32] {
@@ -26,6 +27,22 @@ fn outline_area(survey: &Survey) -> f64 {
         })
         .sum();
     twice as f64 / 2.0 / STEPS / STEPS
+}
+
+#[test]
+fn a_cell_where_nothing_was_surveyed_has_no_data_and_one_without_grains_counts_none() {
+    let mut survey = survey(5, Frame::metres());
+    survey.settings.raster.cell_m = 0.5;
+    survey.surveyed = vec![
+        gravelometer::geometry::PlanBox { min: [0.0, 0.0], max: [0.9, 0.4] },
+        gravelometer::geometry::PlanBox { min: [1.6, 0.6], max: [1.9, 0.9] },
+    ];
+    let raster = raster(&survey);
+    assert_eq!((raster.grid.columns, raster.grid.rows), (4, 2));
+    let count = band(&raster, "grain_count");
+    assert_eq!(count[0..4], [NODATA, NODATA, NODATA, 0.0], "north row");
+    assert_eq!(count[6..8], [NODATA, NODATA], "south row");
+    assert_eq!(count[4] + count[5], 5.0);
 }
 
 #[test]
