@@ -1,7 +1,7 @@
 //! The bed as one implicit body: the union of the stones and the sand.
 
 use super::random::noise;
-use super::scene::{SAND, SceneSettings};
+use super::settings::{SAND, SceneSettings};
 use super::stone::Shape;
 use crate::geometry::DVec3;
 

@@ -1,7 +1,7 @@
 //! Lithology colours of stones and the beige of sand.
 
 use super::random::{Random, noise};
-use super::scene::SAND;
+use super::settings::SAND;
 use crate::geometry::DVec3;
 
 /// Mean colour and strength of the speckle.

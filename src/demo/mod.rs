@@ -21,6 +21,7 @@ mod ply;
 mod random;
 mod scene;
 mod score;
+mod settings;
 mod sheet;
 mod show;
 mod sight;
@@ -30,6 +31,7 @@ mod voxels;
 
 pub use picture::{Picture, PictureError, top_view, write_png};
 pub use ply::{write_ply, write_truth_csv};
-pub use scene::{SAND, Scene, SceneSettings, Stone, make_scene};
+pub use scene::{Scene, Stone, make_scene};
 pub use score::{Detection, MIN_GRAIN_AREA_M2, Score, VISIBLE_AREA_FACTOR, score};
+pub use settings::{SAND, SceneSettings};
 pub use show::{DemoError, Demonstration, Shown, demonstrate};

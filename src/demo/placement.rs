@@ -2,7 +2,7 @@
 
 use super::bed::Sand;
 use super::random::Random;
-use super::scene::SceneSettings;
+use super::settings::SceneSettings;
 use super::stone::Shape;
 use crate::geometry::DVec3;
 use glam::DMat3;

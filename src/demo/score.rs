@@ -1,6 +1,7 @@
 //! How well a segmentation finds the known stones, counted as Rheinwalt et al. (2025) count.
 
-use super::scene::{SAND, Scene};
+use super::scene::Scene;
+use super::settings::SAND;
 use std::collections::BTreeMap;
 use std::fmt;
 

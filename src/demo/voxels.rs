@@ -1,7 +1,7 @@
 //! The bed sampled on a grid of voxel corners, finely only where its surface is.
 
 use super::bed::Bed;
-use super::scene::SceneSettings;
+use super::settings::SceneSettings;
 use crate::geometry::DVec3;
 
 /// Free space kept above the highest stone and solid below the lowest sand, voxels.
