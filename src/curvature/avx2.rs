@@ -1,0 +1,350 @@
+//! The kernel's vector steps in AVX2.
+#![allow(unsafe_code)]
+
+use super::buffer::Points;
+use super::lanes::{Keys, Lanes, MOST, Near, Set};
+use super::thresholds::Thresholds;
+use super::weights::{FIRST, GUESS, ROUND, SECOND, Sum, Weighting};
+use super::{kernel, nearest};
+use std::arch::x86_64::*;
+
+/// Proof that the processor has AVX2, FMA, BMI2 and what comes with them.
+#[derive(Debug, Clone, Copy)]
+pub struct Avx2(());
+
+impl Avx2 {
+    /// The proof, if the processor has them.
+    pub fn detect() -> Option<Avx2> {
+        let has = is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("fma")
+            && is_x86_feature_detected!("bmi1")
+            && is_x86_feature_detected!("bmi2")
+            && is_x86_feature_detected!("lzcnt")
+            && is_x86_feature_detected!("popcnt");
+        has.then_some(Avx2(()))
+    }
+}
+
+#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+fn column(lanes: Avx2, column: &mut kernel::Column<'_, '_>) {
+    kernel::work(lanes, column);
+}
+
+#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+fn nearest_column(lanes: Avx2, column: &mut nearest::Column<'_, '_>) {
+    nearest::work(lanes, column);
+}
+
+/// For each set of eight lanes, their numbers in order, a byte each.
+static TOGETHER: [u64; 256] = {
+    let mut table = [0; 256];
+    let mut set = 0;
+    while set < 256 {
+        let (mut lane, mut to) = (0, 0);
+        while lane < 8 {
+            if set >> lane & 1 == 1 {
+                table[set] |= (lane as u64) << (8 * to);
+                to += 1;
+            }
+            lane += 1;
+        }
+        set += 1;
+    }
+    table
+};
+
+/// Eight numbers from `i` on.
+///
+/// SAFETY contract: AVX is there.
+#[inline(always)]
+unsafe fn load(from: &[f32], i: usize) -> __m256 {
+    let lanes: &[f32; 8] = from[i..i + 8].try_into().expect("eight");
+    // SAFETY: the array holds the 32 bytes that are read.
+    unsafe { _mm256_loadu_ps(lanes.as_ptr()) }
+}
+
+/// Sixteen ranks from `i` on.
+///
+/// SAFETY contract: AVX is there.
+#[inline(always)]
+unsafe fn load_ranks(from: &[u16], i: usize) -> __m256i {
+    let lanes: &[u16; 16] = from[i..i + 16].try_into().expect("sixteen");
+    // SAFETY: the array holds the 32 bytes that are read.
+    unsafe { _mm256_loadu_si256(lanes.as_ptr().cast()) }
+}
+
+/// Four numbers from `i` on.
+///
+/// SAFETY contract: AVX is there.
+#[inline(always)]
+unsafe fn load_f64(from: &[f64], i: usize) -> __m256d {
+    let lanes: &[f64; 4] = from[i..i + 4].try_into().expect("four");
+    // SAFETY: the array holds the 32 bytes that are read.
+    unsafe { _mm256_loadu_pd(lanes.as_ptr()) }
+}
+
+/// Writes eight numbers from `i` on.
+///
+/// SAFETY contract: AVX is there.
+#[inline(always)]
+unsafe fn store(to: &mut [f32], i: usize, value: __m256) {
+    let lanes: &mut [f32; 8] = (&mut to[i..i + 8]).try_into().expect("eight");
+    // SAFETY: the array holds the 32 bytes that are written.
+    unsafe { _mm256_storeu_ps(lanes.as_mut_ptr(), value) }
+}
+
+/// Keeps the candidates that `near` accepts, less `origin`.
+///
+/// SAFETY contract: the instructions are there.
+#[inline(always)]
+unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], near: impl Fn(__m256, __m256, __m256) -> __m256) {
+    kept.reserve(all.len);
+    let mut n = 0;
+    // SAFETY: the instructions are there by this function's contract.
+    unsafe {
+        let [ox, oy, oz] = origin.map(|o| _mm256_set1_ps(o));
+        let mut i = 0;
+        while i < all.len {
+            let x = _mm256_sub_ps(load(&all.x, i), ox);
+            let y = _mm256_sub_ps(load(&all.y, i), oy);
+            let z = _mm256_sub_ps(load(&all.z, i), oz);
+            let mut mask = _mm256_movemask_ps(near(x, y, z)) as usize;
+            if all.len - i < 8 {
+                mask &= (1 << (all.len - i)) - 1;
+            }
+            if mask != 0 {
+                let order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(TOGETHER[mask] as i64));
+                store(&mut kept.x, n, _mm256_permutevar8x32_ps(x, order));
+                store(&mut kept.y, n, _mm256_permutevar8x32_ps(y, order));
+                store(&mut kept.z, n, _mm256_permutevar8x32_ps(z, order));
+                let id: &[u32; 8] = all.id[i..i + 8].try_into().expect("eight");
+                let id = _mm256_permutevar8x32_epi32(_mm256_loadu_si256(id.as_ptr().cast()), order);
+                let to: &mut [u32; 8] = (&mut kept.id[n..n + 8]).try_into().expect("eight");
+                _mm256_storeu_si256(to.as_mut_ptr().cast(), id);
+                n += mask.count_ones() as usize;
+            }
+            i += 8;
+        }
+    }
+    kept.len = n;
+}
+
+/// Which of 32 ranks from `i` on do not exceed the threshold, whose lanes are all alike. Lanes in order if `ORDERED`.
+///
+/// SAFETY contract: the instructions are there.
+#[inline(always)]
+unsafe fn below<const ORDERED: bool>(ranks: &[u16], i: usize, threshold: __m256i) -> u32 {
+    // SAFETY: the instructions are there by this function's contract.
+    unsafe {
+        let within = |i| {
+            let ranks = load_ranks(ranks, i);
+            _mm256_cmpeq_epi16(_mm256_min_epu16(ranks, threshold), ranks)
+        };
+        let packed = _mm256_packs_epi16(within(i), within(i + 16));
+        let packed = if ORDERED { _mm256_permute4x64_epi64::<0b11_01_10_00>(packed) } else { packed };
+        _mm256_movemask_epi8(packed) as u32
+    }
+}
+
+impl Lanes for Avx2 {
+    fn column(self, work: &mut kernel::Column<'_, '_>) {
+        // SAFETY: `self` proves that the instructions are there.
+        unsafe { column(self, work) }
+    }
+
+    fn nearest_column(self, work: &mut nearest::Column<'_, '_>) {
+        // SAFETY: `self` proves that the instructions are there.
+        unsafe { nearest_column(self, work) }
+    }
+
+    #[inline(always)]
+    fn keep_near_box(self, all: &Points, centre: [f32; 3], half: [f32; 3], limit: f32, kept: &mut Points) {
+        // SAFETY: `self` proves that the instructions are there.
+        unsafe {
+            let ([cx, cy, cz], [hx, hy, hz]) = (centre.map(|c| _mm256_set1_ps(c)), half.map(|h| _mm256_set1_ps(h)));
+            let (limit, sign) = (_mm256_set1_ps(limit), _mm256_set1_ps(-0.0));
+            let beyond = |x, c, h| {
+                let far = _mm256_andnot_ps(sign, _mm256_sub_ps(x, c));
+                _mm256_max_ps(_mm256_sub_ps(far, h), _mm256_setzero_ps())
+            };
+            keep(all, kept, [0.0; 3], |x, y, z| {
+                let (x, y, z) = (beyond(x, cx, hx), beyond(y, cy, hy), beyond(z, cz, hz));
+                let d2 = _mm256_fmadd_ps(x, x, _mm256_fmadd_ps(y, y, _mm256_mul_ps(z, z)));
+                _mm256_cmp_ps::<_CMP_LE_OQ>(d2, limit)
+            });
+        }
+    }
+
+    #[inline(always)]
+    fn keep_ball(self, all: &Points, point: [f32; 3], limit: f32, kept: &mut Points) {
+        // SAFETY: `self` proves that the instructions are there.
+        unsafe {
+            let limit = _mm256_set1_ps(limit);
+            keep(all, kept, point, |x, y, z| {
+                let d2 = _mm256_fmadd_ps(x, x, _mm256_fmadd_ps(y, y, _mm256_mul_ps(z, z)));
+                _mm256_cmp_ps::<_CMP_LE_OQ>(d2, limit)
+            });
+        }
+    }
+
+    #[inline(always)]
+    fn least(self, all: &Points, point: [f32; 3]) -> f32 {
+        let mut lanes = [0f32; 8];
+        // SAFETY: `self` proves that the instructions are there; blocks are padded with far points.
+        unsafe {
+            let [px, py, pz] = point.map(|p| _mm256_set1_ps(p));
+            let mut least = _mm256_set1_ps(f32::INFINITY);
+            let mut i = 0;
+            while i < all.len {
+                let x = _mm256_sub_ps(load(&all.x, i), px);
+                let y = _mm256_sub_ps(load(&all.y, i), py);
+                let z = _mm256_sub_ps(load(&all.z, i), pz);
+                least = _mm256_min_ps(_mm256_fmadd_ps(x, x, _mm256_fmadd_ps(y, y, _mm256_mul_ps(z, z))), least);
+                i += 8;
+            }
+            _mm256_storeu_ps(lanes.as_mut_ptr(), least);
+        }
+        lanes.into_iter().fold(f32::INFINITY, |a, b| if b < a { b } else { a })
+    }
+
+    #[inline(always)]
+    fn rank(self, points: &Points, offset: f32, scale: f32, keys: &mut Keys) {
+        let n = Keys::padding(points.len);
+        keys.padded = n;
+        // SAFETY: `self` proves that the instructions are there.
+        unsafe {
+            let (offset, scale) = (_mm256_set1_ps(offset), _mm256_set1_ps(scale));
+            let most = _mm256_set1_ps(65535.0);
+            let ranks = |i: usize| {
+                let (x, y, z) = (load(&points.x, i), load(&points.y, i), load(&points.z, i));
+                let (x2, y2, z2) = (_mm256_mul_ps(x, x), _mm256_mul_ps(y, y), _mm256_mul_ps(z, z));
+                let (yz, zx, xy) = (_mm256_add_ps(y2, z2), _mm256_add_ps(z2, x2), _mm256_add_ps(x2, y2));
+                let rank = |a: __m256, rest: __m256| {
+                    let d2 = _mm256_mul_ps(_mm256_fmadd_ps(a, a, rest), scale);
+                    _mm256_cvttps_epi32(_mm256_min_ps(d2, most))
+                };
+                let pair = |a: __m256, rest: __m256| {
+                    [rank(_mm256_sub_ps(a, offset), rest), rank(_mm256_add_ps(a, offset), rest)]
+                };
+                [pair(x, yz), pair(y, zx), pair(z, xy)]
+            };
+            let mut i = 0;
+            while i < n {
+                let (low, high) = (ranks(i), ranks(i + 8));
+                for q in 0..6 {
+                    let packed = _mm256_packus_epi32(low[q / 2][q % 2], high[q / 2][q % 2]);
+                    let at = q * MOST + i;
+                    let to: &mut [u16; 16] = (&mut keys.rank[at..at + 16]).try_into().expect("sixteen");
+                    // Packing works within halves of a vector; this puts their parts in order.
+                    _mm256_storeu_si256(to.as_mut_ptr().cast(), _mm256_permute4x64_epi64::<0b11_01_10_00>(packed));
+                }
+                i += 16;
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn count(self, keys: &Keys, thresholds: &Thresholds) -> Thresholds {
+        let mut counts = [0; 8];
+        // SAFETY: `self` proves that the instructions are there.
+        unsafe {
+            for q in 0..6 {
+                let ranks = keys.at(q);
+                let threshold = _mm256_set1_epi16(thresholds[q] as i16);
+                let below = |i| below::<false>(ranks, i, threshold).count_ones();
+                let mut count = below(0) + below(32) + below(64);
+                let mut i = 96;
+                while i < ranks.len() {
+                    count += below(i);
+                    i += 32;
+                }
+                counts[q] = count as i32;
+            }
+        }
+        counts
+    }
+
+    #[inline(always)]
+    fn members(self, keys: &Keys, q: usize, threshold: u16, set: &mut Set) {
+        // SAFETY: `self` proves that the instructions are there.
+        unsafe {
+            let ranks = keys.at(q);
+            let threshold = _mm256_set1_epi16(threshold as i16);
+            let below = |i| u64::from(below::<true>(ranks, i, threshold));
+            for i in (0..ranks.len()).step_by(64) {
+                let second = if i + 32 < ranks.len() { below(i + 32) } else { 0 };
+                set[i / 64] = below(i) | second << 32;
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn pack(self, word: u64, places: u64) -> u64 {
+        // SAFETY: `self` proves that the instructions are there.
+        unsafe { _pext_u64(word, places) }
+    }
+
+    #[inline(always)]
+    fn sums(self, near: &Near, weighting: &Weighting) -> [Sum; 6] {
+        let mut result = [Sum::default(); 6];
+        // SAFETY: `self` proves that the instructions are there.
+        unsafe {
+            let set1 = |x: f64| _mm256_set1_pd(x);
+            let (offset, least, scale) = (set1(weighting.offset_m), set1(weighting.least_m2), set1(weighting.scale));
+            let round = set1(ROUND);
+            let weight = |a: __m256d, rest: __m256d| {
+                let d2 = _mm256_add_pd(_mm256_mul_pd(a, a), rest);
+                let x = _mm256_max_pd(d2, least);
+                let half = _mm256_srli_epi64::<1>(_mm256_castpd_si256(x));
+                let guess = _mm256_castsi256_pd(_mm256_sub_epi64(_mm256_set1_epi64x(GUESS as i64), half));
+                let t = _mm256_mul_pd(_mm256_mul_pd(_mm256_mul_pd(set1(FIRST[1]), x), guess), guess);
+                let y = _mm256_mul_pd(guess, _mm256_sub_pd(set1(FIRST[0]), t));
+                let e = _mm256_sub_pd(set1(1.0), _mm256_mul_pd(_mm256_mul_pd(x, y), y));
+                let tail = _mm256_add_pd(set1(SECOND[2]), _mm256_mul_pd(e, set1(SECOND[3])));
+                let tail = _mm256_add_pd(set1(SECOND[1]), _mm256_mul_pd(e, tail));
+                let tail = _mm256_add_pd(set1(SECOND[0]), _mm256_mul_pd(e, tail));
+                let y = _mm256_mul_pd(y, scale);
+                _mm256_add_pd(y, _mm256_mul_pd(_mm256_mul_pd(y, e), tail))
+            };
+            let lane = _mm256_setr_epi64x(1, 2, 4, 8);
+            let words = near.len.div_ceil(64);
+            // One axis at a time, since the registers hold no more.
+            for axis in 0..3 {
+                let mut sums = [[_mm256_setzero_si256(); 2]; 2];
+                let mut i = 0;
+                while i < near.len {
+                    let value = |k: usize| load_f64(&near.value, k * MOST + i);
+                    let (u, b, c) = (value(axis), value((axis + 1) % 3), value((axis + 2) % 3));
+                    let rest = _mm256_add_pd(_mm256_mul_pd(b, b), _mm256_mul_pd(c, c));
+                    let normal = value(3 + axis);
+                    for side in 0..2 {
+                        let bits = (near.of[2 * axis + side][i / 64] >> (i % 64)) as i64;
+                        let belongs = _mm256_cmpeq_epi64(_mm256_and_si256(_mm256_set1_epi64x(bits), lane), lane);
+                        let a = if side == 0 { _mm256_sub_pd(u, offset) } else { _mm256_add_pd(u, offset) };
+                        let w = weight(a, rest);
+                        let weighted = _mm256_castpd_si256(_mm256_add_pd(_mm256_mul_pd(w, normal), round));
+                        let weights = _mm256_castpd_si256(_mm256_add_pd(w, round));
+                        let [sum_n, sum] = sums[side];
+                        sums[side] = [
+                            _mm256_add_epi64(sum_n, _mm256_and_si256(weighted, belongs)),
+                            _mm256_add_epi64(sum, _mm256_and_si256(weights, belongs)),
+                        ];
+                    }
+                    i += 4;
+                }
+                for side in 0..2 {
+                    let q = 2 * axis + side;
+                    let count: u32 = near.of[q][..words].iter().map(|w| w.count_ones()).sum();
+                    let surplus = (ROUND.to_bits() as i64).wrapping_mul(i64::from(count));
+                    let total = |lanes: __m256i| {
+                        let mut each = [0i64; 4];
+                        _mm256_storeu_si256(each.as_mut_ptr().cast(), lanes);
+                        each.into_iter().fold(0i64, i64::wrapping_add).wrapping_sub(surplus)
+                    };
+                    result[q] = Sum { weighted: total(sums[side][0]), weights: total(sums[side][1]) };
+                }
+            }
+        }
+        result
+    }
+}
