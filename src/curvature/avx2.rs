@@ -4,7 +4,7 @@
 use super::buffer::Points;
 use super::lanes::{Keys, Lanes, MOST, Near, Set};
 use super::thresholds::Thresholds;
-use super::weights::{FIRST, GUESS, ROUND, SECOND, Sum, Weighting};
+use super::weights::{FIRST, GUESS, ROUND, SECOND, Sum, Weighting, surplus};
 use super::{kernel, nearest};
 use std::arch::x86_64::*;
 
@@ -136,14 +136,79 @@ unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], near: impl Fn(
 unsafe fn below<const ORDERED: bool>(ranks: &[u16], i: usize, threshold: __m256i) -> u32 {
     // SAFETY: the instructions are there by this function's contract.
     unsafe {
-        let within = |i| {
-            let ranks = load_ranks(ranks, i);
-            _mm256_cmpeq_epi16(_mm256_min_epu16(ranks, threshold), ranks)
-        };
-        let packed = _mm256_packs_epi16(within(i), within(i + 16));
+        let (first, second) = (load_ranks(ranks, i), load_ranks(ranks, i + 16));
+        let first = _mm256_cmpeq_epi16(_mm256_min_epu16(first, threshold), first);
+        let second = _mm256_cmpeq_epi16(_mm256_min_epu16(second, threshold), second);
+        let packed = _mm256_packs_epi16(first, second);
         let packed = if ORDERED { _mm256_permute4x64_epi64::<0b11_01_10_00>(packed) } else { packed };
         _mm256_movemask_epi8(packed) as u32
     }
+}
+
+/// Ranks of candidates at the six stencil points, in 32 bits.
+///
+/// SAFETY contract: the instructions are there.
+#[inline(always)]
+unsafe fn ranks(points: &Points, i: usize, offset: __m256, scale: __m256) -> [__m256i; 6] {
+    // SAFETY: the instructions are there by this function's contract.
+    unsafe {
+        let (x, y, z) = (load(&points.x, i), load(&points.y, i), load(&points.z, i));
+        let (x2, y2, z2) = (_mm256_mul_ps(x, x), _mm256_mul_ps(y, y), _mm256_mul_ps(z, z));
+        let (yz, zx, xy) = (_mm256_add_ps(y2, z2), _mm256_add_ps(z2, x2), _mm256_add_ps(x2, y2));
+        [
+            rank(_mm256_sub_ps(x, offset), yz, scale),
+            rank(_mm256_add_ps(x, offset), yz, scale),
+            rank(_mm256_sub_ps(y, offset), zx, scale),
+            rank(_mm256_add_ps(y, offset), zx, scale),
+            rank(_mm256_sub_ps(z, offset), xy, scale),
+            rank(_mm256_add_ps(z, offset), xy, scale),
+        ]
+    }
+}
+
+/// The floor of `scale` times (a² + rest), 65535 at most.
+///
+/// SAFETY contract: the instructions are there.
+#[inline(always)]
+unsafe fn rank(a: __m256, rest: __m256, scale: __m256) -> __m256i {
+    // SAFETY: the instructions are there by this function's contract.
+    unsafe {
+        let d2 = _mm256_mul_ps(_mm256_fmadd_ps(a, a, rest), scale);
+        _mm256_cvttps_epi32(_mm256_min_ps(d2, _mm256_set1_ps(65535.0)))
+    }
+}
+
+/// [`Weighting::weight`] of a² + rest.
+///
+/// SAFETY contract: the instructions are there.
+#[inline(always)]
+unsafe fn weight(a: __m256d, rest: __m256d, least: __m256d, scale: __m256d) -> __m256d {
+    // SAFETY: the instructions are there by this function's contract.
+    unsafe {
+        let d2 = _mm256_add_pd(_mm256_mul_pd(a, a), rest);
+        let x = _mm256_max_pd(d2, least);
+        let half = _mm256_srli_epi64::<1>(_mm256_castpd_si256(x));
+        let guess = _mm256_castsi256_pd(_mm256_sub_epi64(_mm256_set1_epi64x(GUESS as i64), half));
+        let t = _mm256_mul_pd(_mm256_mul_pd(_mm256_mul_pd(_mm256_set1_pd(FIRST[1]), x), guess), guess);
+        let y = _mm256_mul_pd(guess, _mm256_sub_pd(_mm256_set1_pd(FIRST[0]), t));
+        let e = _mm256_sub_pd(_mm256_set1_pd(1.0), _mm256_mul_pd(_mm256_mul_pd(x, y), y));
+        let tail = _mm256_add_pd(_mm256_set1_pd(SECOND[2]), _mm256_mul_pd(e, _mm256_set1_pd(SECOND[3])));
+        let tail = _mm256_add_pd(_mm256_set1_pd(SECOND[1]), _mm256_mul_pd(e, tail));
+        let tail = _mm256_add_pd(_mm256_set1_pd(SECOND[0]), _mm256_mul_pd(e, tail));
+        let y = _mm256_mul_pd(y, scale);
+        _mm256_add_pd(y, _mm256_mul_pd(_mm256_mul_pd(y, e), tail))
+    }
+}
+
+/// The sum of four integers.
+///
+/// SAFETY contract: AVX is there.
+#[inline(always)]
+unsafe fn total(lanes: __m256i) -> i64 {
+    let mut each = [0i64; 4];
+    // SAFETY: the array holds the 32 bytes that are written.
+    unsafe { _mm256_storeu_si256(each.as_mut_ptr().cast(), lanes) };
+    each[0].wrapping_add(each[1]).wrapping_add(each[2].wrapping_add(each[3]))
 }
 
 impl Lanes for Avx2 {
@@ -214,25 +279,11 @@ impl Lanes for Avx2 {
         // SAFETY: `self` proves that the instructions are there.
         unsafe {
             let (offset, scale) = (_mm256_set1_ps(offset), _mm256_set1_ps(scale));
-            let most = _mm256_set1_ps(65535.0);
-            let ranks = |i: usize| {
-                let (x, y, z) = (load(&points.x, i), load(&points.y, i), load(&points.z, i));
-                let (x2, y2, z2) = (_mm256_mul_ps(x, x), _mm256_mul_ps(y, y), _mm256_mul_ps(z, z));
-                let (yz, zx, xy) = (_mm256_add_ps(y2, z2), _mm256_add_ps(z2, x2), _mm256_add_ps(x2, y2));
-                let rank = |a: __m256, rest: __m256| {
-                    let d2 = _mm256_mul_ps(_mm256_fmadd_ps(a, a, rest), scale);
-                    _mm256_cvttps_epi32(_mm256_min_ps(d2, most))
-                };
-                let pair = |a: __m256, rest: __m256| {
-                    [rank(_mm256_sub_ps(a, offset), rest), rank(_mm256_add_ps(a, offset), rest)]
-                };
-                [pair(x, yz), pair(y, zx), pair(z, xy)]
-            };
             let mut i = 0;
             while i < n {
-                let (low, high) = (ranks(i), ranks(i + 8));
+                let (low, high) = (ranks(points, i, offset, scale), ranks(points, i + 8, offset, scale));
                 for q in 0..6 {
-                    let packed = _mm256_packus_epi32(low[q / 2][q % 2], high[q / 2][q % 2]);
+                    let packed = _mm256_packus_epi32(low[q], high[q]);
                     let at = q * MOST + i;
                     let to: &mut [u16; 16] = (&mut keys.rank[at..at + 16]).try_into().expect("sixteen");
                     // Packing works within halves of a vector; this puts their parts in order.
@@ -251,11 +302,12 @@ impl Lanes for Avx2 {
             for q in 0..6 {
                 let ranks = keys.at(q);
                 let threshold = _mm256_set1_epi16(thresholds[q] as i16);
-                let below = |i| below::<false>(ranks, i, threshold).count_ones();
-                let mut count = below(0) + below(32) + below(64);
+                let mut count = below::<false>(ranks, 0, threshold).count_ones()
+                    + below::<false>(ranks, 32, threshold).count_ones()
+                    + below::<false>(ranks, 64, threshold).count_ones();
                 let mut i = 96;
                 while i < ranks.len() {
-                    count += below(i);
+                    count += below::<false>(ranks, i, threshold).count_ones();
                     i += 32;
                 }
                 counts[q] = count as i32;
@@ -270,10 +322,11 @@ impl Lanes for Avx2 {
         unsafe {
             let ranks = keys.at(q);
             let threshold = _mm256_set1_epi16(threshold as i16);
-            let below = |i| u64::from(below::<true>(ranks, i, threshold));
-            for i in (0..ranks.len()).step_by(64) {
-                let second = if i + 32 < ranks.len() { below(i + 32) } else { 0 };
-                set[i / 64] = below(i) | second << 32;
+            let mut i = 0;
+            while i < ranks.len() {
+                let second = if i + 32 < ranks.len() { below::<true>(ranks, i + 32, threshold) } else { 0 };
+                set[i / 64] = u64::from(below::<true>(ranks, i, threshold)) | u64::from(second) << 32;
+                i += 64;
             }
         }
     }
@@ -289,23 +342,9 @@ impl Lanes for Avx2 {
         let mut result = [Sum::default(); 6];
         // SAFETY: `self` proves that the instructions are there.
         unsafe {
-            let set1 = |x: f64| _mm256_set1_pd(x);
-            let (offset, least, scale) = (set1(weighting.offset_m), set1(weighting.least_m2), set1(weighting.scale));
-            let round = set1(ROUND);
-            let weight = |a: __m256d, rest: __m256d| {
-                let d2 = _mm256_add_pd(_mm256_mul_pd(a, a), rest);
-                let x = _mm256_max_pd(d2, least);
-                let half = _mm256_srli_epi64::<1>(_mm256_castpd_si256(x));
-                let guess = _mm256_castsi256_pd(_mm256_sub_epi64(_mm256_set1_epi64x(GUESS as i64), half));
-                let t = _mm256_mul_pd(_mm256_mul_pd(_mm256_mul_pd(set1(FIRST[1]), x), guess), guess);
-                let y = _mm256_mul_pd(guess, _mm256_sub_pd(set1(FIRST[0]), t));
-                let e = _mm256_sub_pd(set1(1.0), _mm256_mul_pd(_mm256_mul_pd(x, y), y));
-                let tail = _mm256_add_pd(set1(SECOND[2]), _mm256_mul_pd(e, set1(SECOND[3])));
-                let tail = _mm256_add_pd(set1(SECOND[1]), _mm256_mul_pd(e, tail));
-                let tail = _mm256_add_pd(set1(SECOND[0]), _mm256_mul_pd(e, tail));
-                let y = _mm256_mul_pd(y, scale);
-                _mm256_add_pd(y, _mm256_mul_pd(_mm256_mul_pd(y, e), tail))
-            };
+            let offset = _mm256_set1_pd(weighting.offset_m);
+            let (least, scale) = (_mm256_set1_pd(weighting.least_m2), _mm256_set1_pd(weighting.scale));
+            let round = _mm256_set1_pd(ROUND);
             let lane = _mm256_setr_epi64x(1, 2, 4, 8);
             let words = near.len.div_ceil(64);
             // One axis at a time, since the registers hold no more.
@@ -313,15 +352,16 @@ impl Lanes for Avx2 {
                 let mut sums = [[_mm256_setzero_si256(); 2]; 2];
                 let mut i = 0;
                 while i < near.len {
-                    let value = |k: usize| load_f64(&near.value, k * MOST + i);
-                    let (u, b, c) = (value(axis), value((axis + 1) % 3), value((axis + 2) % 3));
+                    let u = load_f64(&near.value, axis * MOST + i);
+                    let b = load_f64(&near.value, (axis + 1) % 3 * MOST + i);
+                    let c = load_f64(&near.value, (axis + 2) % 3 * MOST + i);
                     let rest = _mm256_add_pd(_mm256_mul_pd(b, b), _mm256_mul_pd(c, c));
-                    let normal = value(3 + axis);
+                    let normal = load_f64(&near.value, (3 + axis) * MOST + i);
                     for side in 0..2 {
                         let bits = (near.of[2 * axis + side][i / 64] >> (i % 64)) as i64;
                         let belongs = _mm256_cmpeq_epi64(_mm256_and_si256(_mm256_set1_epi64x(bits), lane), lane);
                         let a = if side == 0 { _mm256_sub_pd(u, offset) } else { _mm256_add_pd(u, offset) };
-                        let w = weight(a, rest);
+                        let w = weight(a, rest, least, scale);
                         let weighted = _mm256_castpd_si256(_mm256_add_pd(_mm256_mul_pd(w, normal), round));
                         let weights = _mm256_castpd_si256(_mm256_add_pd(w, round));
                         let [sum_n, sum] = sums[side];
@@ -334,14 +374,11 @@ impl Lanes for Avx2 {
                 }
                 for side in 0..2 {
                     let q = 2 * axis + side;
-                    let count: u32 = near.of[q][..words].iter().map(|w| w.count_ones()).sum();
-                    let surplus = (ROUND.to_bits() as i64).wrapping_mul(i64::from(count));
-                    let total = |lanes: __m256i| {
-                        let mut each = [0i64; 4];
-                        _mm256_storeu_si256(each.as_mut_ptr().cast(), lanes);
-                        each.into_iter().fold(0i64, i64::wrapping_add).wrapping_sub(surplus)
+                    let surplus = surplus(&near.of[q][..words]);
+                    result[q] = Sum {
+                        weighted: total(sums[side][0]).wrapping_sub(surplus),
+                        weights: total(sums[side][1]).wrapping_sub(surplus),
                     };
-                    result[q] = Sum { weighted: total(sums[side][0]), weights: total(sums[side][1]) };
                 }
             }
         }

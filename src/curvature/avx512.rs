@@ -4,7 +4,7 @@
 use super::buffer::Points;
 use super::lanes::{Keys, Lanes, MOST, Near, Set};
 use super::thresholds::Thresholds;
-use super::weights::{FIRST, GUESS, ROUND, SECOND, Sum, Weighting};
+use super::weights::{FIRST, GUESS, ROUND, SECOND, Sum, Weighting, surplus};
 use super::{kernel, nearest};
 use std::arch::x86_64::*;
 
@@ -119,6 +119,70 @@ unsafe fn keep(
     kept.len = n;
 }
 
+/// Ranks of candidates at the six stencil points, in 32 bits.
+///
+/// SAFETY contract: the instructions are there.
+#[inline(always)]
+unsafe fn ranks(points: &Points, i: usize, offset: __m512, scale: __m512) -> [__m512i; 6] {
+    // SAFETY: the instructions are there by this function's contract.
+    unsafe {
+        let (x, y, z) = (load(&points.x, i), load(&points.y, i), load(&points.z, i));
+        let (x2, y2, z2) = (_mm512_mul_ps(x, x), _mm512_mul_ps(y, y), _mm512_mul_ps(z, z));
+        let (yz, zx, xy) = (_mm512_add_ps(y2, z2), _mm512_add_ps(z2, x2), _mm512_add_ps(x2, y2));
+        [
+            rank(_mm512_sub_ps(x, offset), yz, scale),
+            rank(_mm512_add_ps(x, offset), yz, scale),
+            rank(_mm512_sub_ps(y, offset), zx, scale),
+            rank(_mm512_add_ps(y, offset), zx, scale),
+            rank(_mm512_sub_ps(z, offset), xy, scale),
+            rank(_mm512_add_ps(z, offset), xy, scale),
+        ]
+    }
+}
+
+/// The floor of `scale` times (a² + rest), 65535 at most.
+///
+/// SAFETY contract: the instructions are there.
+#[inline(always)]
+unsafe fn rank(a: __m512, rest: __m512, scale: __m512) -> __m512i {
+    // SAFETY: the instructions are there by this function's contract.
+    unsafe {
+        let d2 = _mm512_mul_ps(_mm512_fmadd_ps(a, a, rest), scale);
+        _mm512_cvttps_epi32(_mm512_min_ps(d2, _mm512_set1_ps(65535.0)))
+    }
+}
+
+/// [`Weighting::weight`] of a² + rest.
+///
+/// SAFETY contract: the instructions are there.
+#[inline(always)]
+unsafe fn weight(a: __m512d, rest: __m512d, least: __m512d, scale: __m512d) -> __m512d {
+    // SAFETY: the instructions are there by this function's contract.
+    unsafe {
+        let d2 = _mm512_add_pd(_mm512_mul_pd(a, a), rest);
+        let x = _mm512_max_pd(d2, least);
+        let half = _mm512_srli_epi64::<1>(_mm512_castpd_si512(x));
+        let guess = _mm512_castsi512_pd(_mm512_sub_epi64(_mm512_set1_epi64(GUESS as i64), half));
+        let t = _mm512_mul_pd(_mm512_mul_pd(_mm512_mul_pd(_mm512_set1_pd(FIRST[1]), x), guess), guess);
+        let y = _mm512_mul_pd(guess, _mm512_sub_pd(_mm512_set1_pd(FIRST[0]), t));
+        let e = _mm512_sub_pd(_mm512_set1_pd(1.0), _mm512_mul_pd(_mm512_mul_pd(x, y), y));
+        let tail = _mm512_add_pd(_mm512_set1_pd(SECOND[2]), _mm512_mul_pd(e, _mm512_set1_pd(SECOND[3])));
+        let tail = _mm512_add_pd(_mm512_set1_pd(SECOND[1]), _mm512_mul_pd(e, tail));
+        let tail = _mm512_add_pd(_mm512_set1_pd(SECOND[0]), _mm512_mul_pd(e, tail));
+        let y = _mm512_mul_pd(y, scale);
+        _mm512_add_pd(y, _mm512_mul_pd(_mm512_mul_pd(y, e), tail))
+    }
+}
+
+/// Which of 32 ranks from `i` on do not exceed the threshold, whose lanes are all alike.
+///
+/// SAFETY contract: the instructions are there.
+#[inline(always)]
+unsafe fn below(from: &[u16], i: usize, threshold: __m512i) -> u32 {
+    // SAFETY: the instructions are there by this function's contract.
+    unsafe { _mm512_cmple_epu16_mask(load_ranks(from, i), threshold) }
+}
+
 impl Lanes for Avx512 {
     fn column(self, work: &mut kernel::Column<'_, '_>) {
         // SAFETY: `self` proves that the instructions are there.
@@ -182,27 +246,13 @@ impl Lanes for Avx512 {
         // SAFETY: `self` proves that the instructions are there.
         unsafe {
             let (offset, scale) = (_mm512_set1_ps(offset), _mm512_set1_ps(scale));
-            let most = _mm512_set1_ps(65535.0);
             // Packing works within quarters of a vector; this puts the quarters back in order.
             let order = _mm512_setr_epi64(0, 2, 4, 6, 1, 3, 5, 7);
-            let ranks = |i: usize| {
-                let (x, y, z) = (load(&points.x, i), load(&points.y, i), load(&points.z, i));
-                let (x2, y2, z2) = (_mm512_mul_ps(x, x), _mm512_mul_ps(y, y), _mm512_mul_ps(z, z));
-                let (yz, zx, xy) = (_mm512_add_ps(y2, z2), _mm512_add_ps(z2, x2), _mm512_add_ps(x2, y2));
-                let rank = |a: __m512, rest: __m512| {
-                    let d2 = _mm512_mul_ps(_mm512_fmadd_ps(a, a, rest), scale);
-                    _mm512_cvttps_epi32(_mm512_min_ps(d2, most))
-                };
-                let pair = |a: __m512, rest: __m512| {
-                    [rank(_mm512_sub_ps(a, offset), rest), rank(_mm512_add_ps(a, offset), rest)]
-                };
-                [pair(x, yz), pair(y, zx), pair(z, xy)]
-            };
             let mut i = 0;
             while i < n {
-                let (low, high) = (ranks(i), ranks(i + 16));
+                let (low, high) = (ranks(points, i, offset, scale), ranks(points, i + 16, offset, scale));
                 for q in 0..6 {
-                    let packed = _mm512_packus_epi32(low[q / 2][q % 2], high[q / 2][q % 2]);
+                    let packed = _mm512_packus_epi32(low[q], high[q]);
                     let at = q * MOST + i;
                     let to: &mut [u16; 32] = (&mut keys.rank[at..at + 32]).try_into().expect("thirty-two");
                     _mm512_storeu_si512(to.as_mut_ptr().cast(), _mm512_permutexvar_epi64(order, packed));
@@ -220,11 +270,12 @@ impl Lanes for Avx512 {
             for q in 0..6 {
                 let ranks = keys.at(q);
                 let threshold = _mm512_set1_epi16(thresholds[q] as i16);
-                let below = |i| _mm512_cmple_epu16_mask(load_ranks(ranks, i), threshold).count_ones();
-                let mut count = below(0) + below(32) + below(64);
+                let mut count = below(ranks, 0, threshold).count_ones()
+                    + below(ranks, 32, threshold).count_ones()
+                    + below(ranks, 64, threshold).count_ones();
                 let mut i = 96;
                 while i < ranks.len() {
-                    count += below(i);
+                    count += below(ranks, i, threshold).count_ones();
                     i += 32;
                 }
                 counts[q] = count as i32;
@@ -239,10 +290,11 @@ impl Lanes for Avx512 {
         unsafe {
             let ranks = keys.at(q);
             let threshold = _mm512_set1_epi16(threshold as i16);
-            let below = |i| u64::from(_mm512_cmple_epu16_mask(load_ranks(ranks, i), threshold));
-            for i in (0..ranks.len()).step_by(64) {
-                let second = if i + 32 < ranks.len() { below(i + 32) } else { 0 };
-                set[i / 64] = below(i) | second << 32;
+            let mut i = 0;
+            while i < ranks.len() {
+                let second = if i + 32 < ranks.len() { below(ranks, i + 32, threshold) } else { 0 };
+                set[i / 64] = u64::from(below(ranks, i, threshold)) | u64::from(second) << 32;
+                i += 64;
             }
         }
     }
@@ -257,37 +309,26 @@ impl Lanes for Avx512 {
     fn sums(self, near: &Near, weighting: &Weighting) -> [Sum; 6] {
         // SAFETY: `self` proves that the instructions are there.
         unsafe {
-            let set1 = |x: f64| _mm512_set1_pd(x);
-            let (offset, least, scale) = (set1(weighting.offset_m), set1(weighting.least_m2), set1(weighting.scale));
-            let round = set1(ROUND);
-            let weight = |a: __m512d, rest: __m512d| {
-                let d2 = _mm512_add_pd(_mm512_mul_pd(a, a), rest);
-                let x = _mm512_max_pd(d2, least);
-                let half = _mm512_srli_epi64::<1>(_mm512_castpd_si512(x));
-                let guess = _mm512_castsi512_pd(_mm512_sub_epi64(_mm512_set1_epi64(GUESS as i64), half));
-                let t = _mm512_mul_pd(_mm512_mul_pd(_mm512_mul_pd(set1(FIRST[1]), x), guess), guess);
-                let y = _mm512_mul_pd(guess, _mm512_sub_pd(set1(FIRST[0]), t));
-                let e = _mm512_sub_pd(set1(1.0), _mm512_mul_pd(_mm512_mul_pd(x, y), y));
-                let tail = _mm512_add_pd(set1(SECOND[2]), _mm512_mul_pd(e, set1(SECOND[3])));
-                let tail = _mm512_add_pd(set1(SECOND[1]), _mm512_mul_pd(e, tail));
-                let tail = _mm512_add_pd(set1(SECOND[0]), _mm512_mul_pd(e, tail));
-                let y = _mm512_mul_pd(y, scale);
-                _mm512_add_pd(y, _mm512_mul_pd(_mm512_mul_pd(y, e), tail))
-            };
+            let offset = _mm512_set1_pd(weighting.offset_m);
+            let (least, scale) = (_mm512_set1_pd(weighting.least_m2), _mm512_set1_pd(weighting.scale));
+            let round = _mm512_set1_pd(ROUND);
             let mut sums = [[_mm512_setzero_si512(); 2]; 6];
             let mut i = 0;
             while i < near.len {
-                let value = |k: usize| load_f64(&near.value, k * MOST + i);
-                let u = [value(0), value(1), value(2)];
-                let [x2, y2, z2] = u.map(|u| _mm512_mul_pd(u, u));
+                let u = [
+                    load_f64(&near.value, i),
+                    load_f64(&near.value, MOST + i),
+                    load_f64(&near.value, 2 * MOST + i),
+                ];
+                let (x2, y2, z2) = (_mm512_mul_pd(u[0], u[0]), _mm512_mul_pd(u[1], u[1]), _mm512_mul_pd(u[2], u[2]));
                 let rest = [_mm512_add_pd(y2, z2), _mm512_add_pd(z2, x2), _mm512_add_pd(x2, y2)];
                 for axis in 0..3 {
-                    let normal = value(3 + axis);
+                    let normal = load_f64(&near.value, (3 + axis) * MOST + i);
                     for side in 0..2 {
                         let q = 2 * axis + side;
                         let mask = (near.of[q][i / 64] >> (i % 64)) as u8;
                         let a = if side == 0 { _mm512_sub_pd(u[axis], offset) } else { _mm512_add_pd(u[axis], offset) };
-                        let w = weight(a, rest[axis]);
+                        let w = weight(a, rest[axis], least, scale);
                         let (weighted, weights) = (_mm512_add_pd(_mm512_mul_pd(w, normal), round), _mm512_add_pd(w, round));
                         let [sum_n, sum] = sums[q];
                         sums[q] = [
@@ -301,8 +342,7 @@ impl Lanes for Avx512 {
             let words = near.len.div_ceil(64);
             let mut result = [Sum::default(); 6];
             for q in 0..6 {
-                let count: u32 = near.of[q][..words].iter().map(|w| w.count_ones()).sum();
-                let surplus = (ROUND.to_bits() as i64).wrapping_mul(i64::from(count));
+                let surplus = surplus(&near.of[q][..words]);
                 result[q] = Sum {
                     weighted: _mm512_reduce_add_epi64(sums[q][0]).wrapping_sub(surplus),
                     weights: _mm512_reduce_add_epi64(sums[q][1]).wrapping_sub(surplus),

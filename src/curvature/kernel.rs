@@ -307,12 +307,20 @@ fn error_in_ranks(grid: &Grid, at: DVec3, radius_m: f64, complete_m: f64) -> f64
 #[inline(always)]
 fn choose<L: Lanes>(lanes: L, job: &Job<'_>, work: &mut Workspace, p: DVec3, thresholds: &Thresholds) {
     let k = job.stencil.neighbours as i32;
-    let below = lanes.count(&work.keys, &thresholds.map(|t| (t - 1).max(0)));
+    let mut lower = *thresholds;
+    for t in &mut lower {
+        *t = (*t - 1).max(0);
+    }
+    let below = lanes.count(&work.keys, &lower);
     let clear = |q: usize| below[q] == k && thresholds[q] > 0;
     for q in 0..6 {
         lanes.members(&work.keys, q, thresholds[q] as u16, &mut work.sets[q]);
     }
-    if !(0..6).all(clear) {
+    let mut all = true;
+    for q in 0..6 {
+        all &= clear(q);
+    }
+    if !all {
         work.tally[0] += 1;
         for q in 0..6 {
             if !clear(q) {
@@ -375,7 +383,8 @@ fn fetch<L: Lanes>(lanes: L, job: &Job<'_>, work: &mut Workspace, p: DVec3) {
     }
     let mut n = 0usize;
     for w in 0..words {
-        let mut any = (0..6).fold(0, |any, q| any | work.sets[q][w]);
+        let s = &work.sets;
+        let mut any = s[0][w] | s[1][w] | s[2][w] | s[3][w] | s[4][w] | s[5][w];
         let (word, bit) = (n / 64, n % 64);
         for q in 0..6 {
             let packed = lanes.pack(work.sets[q][w], any);

@@ -86,12 +86,24 @@ pub fn rounded(x: f64) -> i64 {
     ((x + ROUND).to_bits() as i64).wrapping_sub(ROUND.to_bits() as i64)
 }
 
+/// What rounding leaves in the sum of the bits of as many rounded numbers as the set has members.
+#[inline(always)]
+pub fn surplus(set: &[u64]) -> i64 {
+    let mut count = 0;
+    for word in set {
+        count += word.count_ones();
+    }
+    (ROUND.to_bits() as i64).wrapping_mul(i64::from(count))
+}
+
 /// The divergence from the sums at +x, -x, +y, -y, +z, -z; 1/m.
 #[inline(always)]
 pub fn divergence_of(sums: &[Sum; 6], offset_m: f64) -> f64 {
-    let mean = |s: &Sum| s.weighted as f64 / s.weights as f64;
-    let [x, y, z] = [0, 2, 4].map(|q| mean(&sums[q]) - mean(&sums[q + 1]));
-    (x + y + z) / (2.0 * offset_m)
+    let mut mean = [0.0; 6];
+    for (mean, sum) in mean.iter_mut().zip(sums) {
+        *mean = sum.weighted as f64 / sum.weights as f64;
+    }
+    ((mean[0] - mean[1]) + (mean[2] - mean[3]) + (mean[4] - mean[5])) / (2.0 * offset_m)
 }
 
 #[cfg(test)]
