@@ -38,7 +38,7 @@ fn timing() {
             let (f, p, area) = read(&path);
             let side = area.sqrt();
             let reps: usize = std::env::var("REPS").map_or(3, |r| r.parse().unwrap());
-            for set in InstructionSet::available() {
+            for set in InstructionSet::available().into_iter().filter(|s| std::env::var("SET").map_or(true, |w| format!("{s:?}") == w)) {
                 let (mut best, mut best_d) = (f64::MAX, f64::MAX);
                 let mut hash = 0u64;
                 for r in 0..reps {

@@ -1,11 +1,13 @@
 //! The kernel's vector steps in AVX2.
 #![allow(unsafe_code)]
 
-use super::buffer::Points;
-use super::lanes::{Keys, Lanes, MOST, Near, Set};
+use super::buffer::{Points, SLACK};
+use super::lanes::{Keys, Lanes, MOST, Near, Set, choose, fetch};
 use super::thresholds::Thresholds;
 use super::weights::{FIRST, GUESS, ROUND, SECOND, Sum, Weighting, surplus};
 use super::{kernel, nearest};
+use crate::geometry::DVec3;
+use crate::tile::NormalField;
 use std::arch::x86_64::*;
 
 /// Proof that the processor has AVX2, FMA, BMI2 and what comes with them.
@@ -55,42 +57,29 @@ static TOGETHER: [u64; 256] = {
 
 /// Eight numbers from `i` on.
 ///
-/// SAFETY contract: AVX is there.
+/// SAFETY contract: AVX is there, and so are the numbers.
 #[inline(always)]
-unsafe fn load(from: &[f32], i: usize) -> __m256 {
-    let lanes: &[f32; 8] = from[i..i + 8].try_into().expect("eight");
-    // SAFETY: the array holds the 32 bytes that are read.
-    unsafe { _mm256_loadu_ps(lanes.as_ptr()) }
+unsafe fn load(from: *const f32, i: usize) -> __m256 {
+    // SAFETY: by this function's contract.
+    unsafe { _mm256_loadu_ps(from.add(i)) }
 }
 
 /// Sixteen ranks from `i` on.
 ///
-/// SAFETY contract: AVX is there.
+/// SAFETY contract: AVX is there, and so are the ranks.
 #[inline(always)]
-unsafe fn load_ranks(from: &[u16], i: usize) -> __m256i {
-    let lanes: &[u16; 16] = from[i..i + 16].try_into().expect("sixteen");
-    // SAFETY: the array holds the 32 bytes that are read.
-    unsafe { _mm256_loadu_si256(lanes.as_ptr().cast()) }
+unsafe fn load_ranks(from: *const u16, i: usize) -> __m256i {
+    // SAFETY: by this function's contract.
+    unsafe { _mm256_loadu_si256(from.add(i).cast()) }
 }
 
 /// Four numbers from `i` on.
 ///
-/// SAFETY contract: AVX is there.
+/// SAFETY contract: AVX is there, and so are the numbers.
 #[inline(always)]
-unsafe fn load_f64(from: &[f64], i: usize) -> __m256d {
-    let lanes: &[f64; 4] = from[i..i + 4].try_into().expect("four");
-    // SAFETY: the array holds the 32 bytes that are read.
-    unsafe { _mm256_loadu_pd(lanes.as_ptr()) }
-}
-
-/// Writes eight numbers from `i` on.
-///
-/// SAFETY contract: AVX is there.
-#[inline(always)]
-unsafe fn store(to: &mut [f32], i: usize, value: __m256) {
-    let lanes: &mut [f32; 8] = (&mut to[i..i + 8]).try_into().expect("eight");
-    // SAFETY: the array holds the 32 bytes that are written.
-    unsafe { _mm256_storeu_ps(lanes.as_mut_ptr(), value) }
+unsafe fn load_f64(from: *const f64, i: usize) -> __m256d {
+    // SAFETY: by this function's contract.
+    unsafe { _mm256_loadu_pd(from.add(i)) }
 }
 
 /// Keeps the candidates that `near` accepts, less `origin`.
@@ -99,28 +88,30 @@ unsafe fn store(to: &mut [f32], i: usize, value: __m256) {
 #[inline(always)]
 unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], near: impl Fn(__m256, __m256, __m256) -> __m256) {
     kept.reserve(all.len);
+    assert!(all.fits(all.len) && kept.fits(all.len), "room for the candidates and the slack");
+    let (xs, ys, zs, ids) = (all.x.as_ptr(), all.y.as_ptr(), all.z.as_ptr(), all.id.as_ptr());
+    let (kx, ky, kz, kid) = (kept.x.as_mut_ptr(), kept.y.as_mut_ptr(), kept.z.as_mut_ptr(), kept.id.as_mut_ptr());
     let mut n = 0;
-    // SAFETY: the instructions are there by this function's contract.
+    // SAFETY: the instructions are there by this function's contract. Both `i` and `n` are below `all.len`, and the
+    // slack that was asserted is wider than a vector.
     unsafe {
         let [ox, oy, oz] = origin.map(|o| _mm256_set1_ps(o));
         let mut i = 0;
         while i < all.len {
-            let x = _mm256_sub_ps(load(&all.x, i), ox);
-            let y = _mm256_sub_ps(load(&all.y, i), oy);
-            let z = _mm256_sub_ps(load(&all.z, i), oz);
+            let x = _mm256_sub_ps(load(xs, i), ox);
+            let y = _mm256_sub_ps(load(ys, i), oy);
+            let z = _mm256_sub_ps(load(zs, i), oz);
             let mut mask = _mm256_movemask_ps(near(x, y, z)) as usize;
             if all.len - i < 8 {
                 mask &= (1 << (all.len - i)) - 1;
             }
             if mask != 0 {
                 let order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(TOGETHER[mask] as i64));
-                store(&mut kept.x, n, _mm256_permutevar8x32_ps(x, order));
-                store(&mut kept.y, n, _mm256_permutevar8x32_ps(y, order));
-                store(&mut kept.z, n, _mm256_permutevar8x32_ps(z, order));
-                let id: &[u32; 8] = all.id[i..i + 8].try_into().expect("eight");
-                let id = _mm256_permutevar8x32_epi32(_mm256_loadu_si256(id.as_ptr().cast()), order);
-                let to: &mut [u32; 8] = (&mut kept.id[n..n + 8]).try_into().expect("eight");
-                _mm256_storeu_si256(to.as_mut_ptr().cast(), id);
+                _mm256_storeu_ps(kx.add(n), _mm256_permutevar8x32_ps(x, order));
+                _mm256_storeu_ps(ky.add(n), _mm256_permutevar8x32_ps(y, order));
+                _mm256_storeu_ps(kz.add(n), _mm256_permutevar8x32_ps(z, order));
+                let id = _mm256_permutevar8x32_epi32(_mm256_loadu_si256(ids.add(i).cast()), order);
+                _mm256_storeu_si256(kid.add(n).cast(), id);
                 n += mask.count_ones() as usize;
             }
             i += 8;
@@ -133,7 +124,7 @@ unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], near: impl Fn(
 ///
 /// SAFETY contract: the instructions are there.
 #[inline(always)]
-unsafe fn below<const ORDERED: bool>(ranks: &[u16], i: usize, threshold: __m256i) -> u32 {
+unsafe fn below<const ORDERED: bool>(ranks: *const u16, i: usize, threshold: __m256i) -> u32 {
     // SAFETY: the instructions are there by this function's contract.
     unsafe {
         let (first, second) = (load_ranks(ranks, i), load_ranks(ranks, i + 16));
@@ -152,7 +143,7 @@ unsafe fn below<const ORDERED: bool>(ranks: &[u16], i: usize, threshold: __m256i
 unsafe fn ranks(points: &Points, i: usize, offset: __m256, scale: __m256) -> [__m256i; 6] {
     // SAFETY: the instructions are there by this function's contract.
     unsafe {
-        let (x, y, z) = (load(&points.x, i), load(&points.y, i), load(&points.z, i));
+        let (x, y, z) = (load(points.x.as_ptr(), i), load(points.y.as_ptr(), i), load(points.z.as_ptr(), i));
         let (x2, y2, z2) = (_mm256_mul_ps(x, x), _mm256_mul_ps(y, y), _mm256_mul_ps(z, z));
         let (yz, zx, xy) = (_mm256_add_ps(y2, z2), _mm256_add_ps(z2, x2), _mm256_add_ps(x2, y2));
         [
@@ -255,15 +246,18 @@ impl Lanes for Avx2 {
     #[inline(always)]
     fn least(self, all: &Points, point: [f32; 3]) -> f32 {
         let mut lanes = [0f32; 8];
-        // SAFETY: `self` proves that the instructions are there; blocks are padded with far points.
+        assert!(all.fits(all.len), "room for the candidates and the slack");
+        let (xs, ys, zs) = (all.x.as_ptr(), all.y.as_ptr(), all.z.as_ptr());
+        // SAFETY: `self` proves that the instructions are there; `i` is below `all.len`, and the slack wider than a
+        // vector. Blocks are padded with far points.
         unsafe {
             let [px, py, pz] = point.map(|p| _mm256_set1_ps(p));
             let mut least = _mm256_set1_ps(f32::INFINITY);
             let mut i = 0;
             while i < all.len {
-                let x = _mm256_sub_ps(load(&all.x, i), px);
-                let y = _mm256_sub_ps(load(&all.y, i), py);
-                let z = _mm256_sub_ps(load(&all.z, i), pz);
+                let x = _mm256_sub_ps(load(xs, i), px);
+                let y = _mm256_sub_ps(load(ys, i), py);
+                let z = _mm256_sub_ps(load(zs, i), pz);
                 least = _mm256_min_ps(_mm256_fmadd_ps(x, x, _mm256_fmadd_ps(y, y, _mm256_mul_ps(z, z))), least);
                 i += 8;
             }
@@ -276,7 +270,10 @@ impl Lanes for Avx2 {
     fn rank(self, points: &Points, offset: f32, scale: f32, keys: &mut Keys) {
         let n = Keys::padding(points.len);
         keys.padded = n;
-        // SAFETY: `self` proves that the instructions are there.
+        assert!(n <= MOST && points.fits(n - SLACK.min(n)), "room for the candidates");
+        assert!(keys.rank.len() >= 6 * MOST, "room for their ranks");
+        let to = keys.rank.as_mut_ptr();
+        // SAFETY: `self` proves that the instructions are there; `i` and the vectors from it on are below `n`.
         unsafe {
             let (offset, scale) = (_mm256_set1_ps(offset), _mm256_set1_ps(scale));
             let mut i = 0;
@@ -284,10 +281,8 @@ impl Lanes for Avx2 {
                 let (low, high) = (ranks(points, i, offset, scale), ranks(points, i + 8, offset, scale));
                 for q in 0..6 {
                     let packed = _mm256_packus_epi32(low[q], high[q]);
-                    let at = q * MOST + i;
-                    let to: &mut [u16; 16] = (&mut keys.rank[at..at + 16]).try_into().expect("sixteen");
                     // Packing works within halves of a vector; this puts their parts in order.
-                    _mm256_storeu_si256(to.as_mut_ptr().cast(), _mm256_permute4x64_epi64::<0b11_01_10_00>(packed));
+                    _mm256_storeu_si256(to.add(q * MOST + i).cast(), _mm256_permute4x64_epi64::<0b11_01_10_00>(packed));
                 }
                 i += 16;
             }
@@ -297,16 +292,17 @@ impl Lanes for Avx2 {
     #[inline(always)]
     fn count(self, keys: &Keys, thresholds: &Thresholds) -> Thresholds {
         let mut counts = [0; 8];
-        // SAFETY: `self` proves that the instructions are there.
+        let padded = keys.checked_padded();
+        // SAFETY: `self` proves that the instructions are there; as many ranks are there as was checked.
         unsafe {
             for q in 0..6 {
-                let ranks = keys.at(q);
+                let ranks = keys.rank.as_ptr().add(q * MOST);
                 let threshold = _mm256_set1_epi16(thresholds[q] as i16);
                 let mut count = below::<false>(ranks, 0, threshold).count_ones()
                     + below::<false>(ranks, 32, threshold).count_ones()
                     + below::<false>(ranks, 64, threshold).count_ones();
                 let mut i = 96;
-                while i < ranks.len() {
+                while i < padded {
                     count += below::<false>(ranks, i, threshold).count_ones();
                     i += 32;
                 }
@@ -318,13 +314,15 @@ impl Lanes for Avx2 {
 
     #[inline(always)]
     fn members(self, keys: &Keys, q: usize, threshold: u16, set: &mut Set) {
-        // SAFETY: `self` proves that the instructions are there.
+        let padded = keys.checked_padded();
+        assert!(q < 6, "one of six stencil points");
+        // SAFETY: `self` proves that the instructions are there; as many ranks are there as was checked.
         unsafe {
-            let ranks = keys.at(q);
+            let ranks = keys.rank.as_ptr().add(q * MOST);
             let threshold = _mm256_set1_epi16(threshold as i16);
             let mut i = 0;
-            while i < ranks.len() {
-                let second = if i + 32 < ranks.len() { below::<true>(ranks, i + 32, threshold) } else { 0 };
+            while i < padded {
+                let second = if i + 32 < padded { below::<true>(ranks, i + 32, threshold) } else { 0 };
                 set[i / 64] = u64::from(below::<true>(ranks, i, threshold)) | u64::from(second) << 32;
                 i += 64;
             }
@@ -338,9 +336,22 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
+    fn choose(self, from: &[u32], places: u64, to: &mut [u32]) -> usize {
+        choose(from, places, to)
+    }
+
+    #[inline(always)]
+    fn fetch(self, field: &NormalField, vertex: DVec3, near: &mut Near) {
+        fetch(field, vertex, near);
+    }
+
+    #[inline(always)]
     fn sums(self, near: &Near, weighting: &Weighting) -> [Sum; 6] {
         let mut result = [Sum::default(); 6];
-        // SAFETY: `self` proves that the instructions are there.
+        assert!(near.len <= MOST && near.value.len() >= 6 * MOST, "whole vectors of neighbours");
+        let value = near.value.as_ptr();
+        // SAFETY: `self` proves that the instructions are there; `i` is below `near.len`, and `MOST` a multiple of the
+        // lanes.
         unsafe {
             let offset = _mm256_set1_pd(weighting.offset_m);
             let (least, scale) = (_mm256_set1_pd(weighting.least_m2), _mm256_set1_pd(weighting.scale));
@@ -352,11 +363,11 @@ impl Lanes for Avx2 {
                 let mut sums = [[_mm256_setzero_si256(); 2]; 2];
                 let mut i = 0;
                 while i < near.len {
-                    let u = load_f64(&near.value, axis * MOST + i);
-                    let b = load_f64(&near.value, (axis + 1) % 3 * MOST + i);
-                    let c = load_f64(&near.value, (axis + 2) % 3 * MOST + i);
+                    let u = load_f64(value, axis * MOST + i);
+                    let b = load_f64(value, (axis + 1) % 3 * MOST + i);
+                    let c = load_f64(value, (axis + 2) % 3 * MOST + i);
                     let rest = _mm256_add_pd(_mm256_mul_pd(b, b), _mm256_mul_pd(c, c));
-                    let normal = load_f64(&near.value, (3 + axis) * MOST + i);
+                    let normal = load_f64(value, (3 + axis) * MOST + i);
                     for side in 0..2 {
                         let bits = (near.of[2 * axis + side][i / 64] >> (i % 64)) as i64;
                         let belongs = _mm256_cmpeq_epi64(_mm256_and_si256(_mm256_set1_epi64x(bits), lane), lane);

@@ -1,11 +1,13 @@
 //! The kernel's vector steps in AVX-512.
 #![allow(unsafe_code)]
 
-use super::buffer::Points;
+use super::buffer::{Points, SLACK};
 use super::lanes::{Keys, Lanes, MOST, Near, Set};
 use super::thresholds::Thresholds;
 use super::weights::{FIRST, GUESS, ROUND, SECOND, Sum, Weighting, surplus};
 use super::{kernel, nearest};
+use crate::geometry::DVec3;
+use crate::tile::NormalField;
 use std::arch::x86_64::*;
 
 /// Proof that the processor has AVX-512 F, BW, DQ and VL, and what comes with them.
@@ -41,42 +43,29 @@ fn nearest_column(lanes: Avx512, column: &mut nearest::Column<'_, '_>) {
 
 /// Sixteen numbers from `i` on.
 ///
-/// SAFETY contract: AVX-512 F is there.
+/// SAFETY contract: AVX-512 F is there, and so are the numbers.
 #[inline(always)]
-unsafe fn load(from: &[f32], i: usize) -> __m512 {
-    let lanes: &[f32; 16] = from[i..i + 16].try_into().expect("sixteen");
-    // SAFETY: the array holds the 64 bytes that are read.
-    unsafe { _mm512_loadu_ps(lanes.as_ptr()) }
+unsafe fn load(from: *const f32, i: usize) -> __m512 {
+    // SAFETY: by this function's contract.
+    unsafe { _mm512_loadu_ps(from.add(i)) }
 }
 
 /// Thirty-two ranks from `i` on.
 ///
-/// SAFETY contract: AVX-512 F is there.
+/// SAFETY contract: AVX-512 F is there, and so are the ranks.
 #[inline(always)]
-unsafe fn load_ranks(from: &[u16], i: usize) -> __m512i {
-    let lanes: &[u16; 32] = from[i..i + 32].try_into().expect("thirty-two");
-    // SAFETY: the array holds the 64 bytes that are read.
-    unsafe { _mm512_loadu_si512(lanes.as_ptr().cast()) }
+unsafe fn load_ranks(from: *const u16, i: usize) -> __m512i {
+    // SAFETY: by this function's contract.
+    unsafe { _mm512_loadu_si512(from.add(i).cast()) }
 }
 
 /// Eight numbers from `i` on.
 ///
-/// SAFETY contract: AVX-512 F is there.
+/// SAFETY contract: AVX-512 F is there, and so are the numbers.
 #[inline(always)]
-unsafe fn load_f64(from: &[f64], i: usize) -> __m512d {
-    let lanes: &[f64; 8] = from[i..i + 8].try_into().expect("eight");
-    // SAFETY: the array holds the 64 bytes that are read.
-    unsafe { _mm512_loadu_pd(lanes.as_ptr()) }
-}
-
-/// Writes sixteen numbers from `i` on.
-///
-/// SAFETY contract: AVX-512 F is there.
-#[inline(always)]
-unsafe fn store(to: &mut [f32], i: usize, value: __m512) {
-    let lanes: &mut [f32; 16] = (&mut to[i..i + 16]).try_into().expect("sixteen");
-    // SAFETY: the array holds the 64 bytes that are written.
-    unsafe { _mm512_storeu_ps(lanes.as_mut_ptr(), value) }
+unsafe fn load_f64(from: *const f64, i: usize) -> __m512d {
+    // SAFETY: by this function's contract.
+    unsafe { _mm512_loadu_pd(from.add(i)) }
 }
 
 /// Keeps the candidates that `near` accepts, less `origin`.
@@ -90,27 +79,29 @@ unsafe fn keep(
     near: impl Fn(__m512, __m512, __m512) -> __mmask16,
 ) {
     kept.reserve(all.len);
+    assert!(all.fits(all.len) && kept.fits(all.len), "room for the candidates and the slack");
+    let (xs, ys, zs, ids) = (all.x.as_ptr(), all.y.as_ptr(), all.z.as_ptr(), all.id.as_ptr());
+    let (kx, ky, kz, kid) = (kept.x.as_mut_ptr(), kept.y.as_mut_ptr(), kept.z.as_mut_ptr(), kept.id.as_mut_ptr());
     let mut n = 0;
-    // SAFETY: the instructions are there by this function's contract.
+    // SAFETY: the instructions are there by this function's contract. Both `i` and `n` are below `all.len`, and the
+    // slack that was asserted is wider than a vector.
     unsafe {
         let [ox, oy, oz] = origin.map(|o| _mm512_set1_ps(o));
         let mut i = 0;
         while i < all.len {
-            let x = _mm512_sub_ps(load(&all.x, i), ox);
-            let y = _mm512_sub_ps(load(&all.y, i), oy);
-            let z = _mm512_sub_ps(load(&all.z, i), oz);
+            let x = _mm512_sub_ps(load(xs, i), ox);
+            let y = _mm512_sub_ps(load(ys, i), oy);
+            let z = _mm512_sub_ps(load(zs, i), oz);
             let mut mask = near(x, y, z);
             if all.len - i < 16 {
                 mask &= (1 << (all.len - i)) - 1;
             }
             if mask != 0 {
-                store(&mut kept.x, n, _mm512_maskz_compress_ps(mask, x));
-                store(&mut kept.y, n, _mm512_maskz_compress_ps(mask, y));
-                store(&mut kept.z, n, _mm512_maskz_compress_ps(mask, z));
-                let id: &[u32; 16] = all.id[i..i + 16].try_into().expect("sixteen");
-                let id = _mm512_maskz_compress_epi32(mask, _mm512_loadu_si512(id.as_ptr().cast()));
-                let to: &mut [u32; 16] = (&mut kept.id[n..n + 16]).try_into().expect("sixteen");
-                _mm512_storeu_si512(to.as_mut_ptr().cast(), id);
+                _mm512_storeu_ps(kx.add(n), _mm512_maskz_compress_ps(mask, x));
+                _mm512_storeu_ps(ky.add(n), _mm512_maskz_compress_ps(mask, y));
+                _mm512_storeu_ps(kz.add(n), _mm512_maskz_compress_ps(mask, z));
+                let id = _mm512_maskz_compress_epi32(mask, _mm512_loadu_si512(ids.add(i).cast()));
+                _mm512_storeu_si512(kid.add(n).cast(), id);
                 n += mask.count_ones() as usize;
             }
             i += 16;
@@ -126,7 +117,7 @@ unsafe fn keep(
 unsafe fn ranks(points: &Points, i: usize, offset: __m512, scale: __m512) -> [__m512i; 6] {
     // SAFETY: the instructions are there by this function's contract.
     unsafe {
-        let (x, y, z) = (load(&points.x, i), load(&points.y, i), load(&points.z, i));
+        let (x, y, z) = (load(points.x.as_ptr(), i), load(points.y.as_ptr(), i), load(points.z.as_ptr(), i));
         let (x2, y2, z2) = (_mm512_mul_ps(x, x), _mm512_mul_ps(y, y), _mm512_mul_ps(z, z));
         let (yz, zx, xy) = (_mm512_add_ps(y2, z2), _mm512_add_ps(z2, x2), _mm512_add_ps(x2, y2));
         [
@@ -178,7 +169,7 @@ unsafe fn weight(a: __m512d, rest: __m512d, least: __m512d, scale: __m512d) -> _
 ///
 /// SAFETY contract: the instructions are there.
 #[inline(always)]
-unsafe fn below(from: &[u16], i: usize, threshold: __m512i) -> u32 {
+unsafe fn below(from: *const u16, i: usize, threshold: __m512i) -> u32 {
     // SAFETY: the instructions are there by this function's contract.
     unsafe { _mm512_cmple_epu16_mask(load_ranks(from, i), threshold) }
 }
@@ -223,15 +214,18 @@ impl Lanes for Avx512 {
 
     #[inline(always)]
     fn least(self, all: &Points, point: [f32; 3]) -> f32 {
-        // SAFETY: `self` proves that the instructions are there; blocks are padded with far points.
+        assert!(all.fits(all.len), "room for the candidates and the slack");
+        let (xs, ys, zs) = (all.x.as_ptr(), all.y.as_ptr(), all.z.as_ptr());
+        // SAFETY: `self` proves that the instructions are there; `i` is below `all.len`, and the slack wider than a
+        // vector. Blocks are padded with far points.
         unsafe {
             let [px, py, pz] = point.map(|p| _mm512_set1_ps(p));
             let mut least = _mm512_set1_ps(f32::INFINITY);
             let mut i = 0;
             while i < all.len {
-                let x = _mm512_sub_ps(load(&all.x, i), px);
-                let y = _mm512_sub_ps(load(&all.y, i), py);
-                let z = _mm512_sub_ps(load(&all.z, i), pz);
+                let x = _mm512_sub_ps(load(xs, i), px);
+                let y = _mm512_sub_ps(load(ys, i), py);
+                let z = _mm512_sub_ps(load(zs, i), pz);
                 least = _mm512_min_ps(_mm512_fmadd_ps(x, x, _mm512_fmadd_ps(y, y, _mm512_mul_ps(z, z))), least);
                 i += 16;
             }
@@ -243,7 +237,10 @@ impl Lanes for Avx512 {
     fn rank(self, points: &Points, offset: f32, scale: f32, keys: &mut Keys) {
         let n = Keys::padding(points.len);
         keys.padded = n;
-        // SAFETY: `self` proves that the instructions are there.
+        assert!(n <= MOST && points.fits(n - SLACK.min(n)), "room for the candidates");
+        assert!(keys.rank.len() >= 6 * MOST, "room for their ranks");
+        let to = keys.rank.as_mut_ptr();
+        // SAFETY: `self` proves that the instructions are there; `i` and the vectors from it on are below `n`.
         unsafe {
             let (offset, scale) = (_mm512_set1_ps(offset), _mm512_set1_ps(scale));
             // Packing works within quarters of a vector; this puts the quarters back in order.
@@ -253,9 +250,7 @@ impl Lanes for Avx512 {
                 let (low, high) = (ranks(points, i, offset, scale), ranks(points, i + 16, offset, scale));
                 for q in 0..6 {
                     let packed = _mm512_packus_epi32(low[q], high[q]);
-                    let at = q * MOST + i;
-                    let to: &mut [u16; 32] = (&mut keys.rank[at..at + 32]).try_into().expect("thirty-two");
-                    _mm512_storeu_si512(to.as_mut_ptr().cast(), _mm512_permutexvar_epi64(order, packed));
+                    _mm512_storeu_si512(to.add(q * MOST + i).cast(), _mm512_permutexvar_epi64(order, packed));
                 }
                 i += 32;
             }
@@ -265,16 +260,17 @@ impl Lanes for Avx512 {
     #[inline(always)]
     fn count(self, keys: &Keys, thresholds: &Thresholds) -> Thresholds {
         let mut counts = [0; 8];
-        // SAFETY: `self` proves that the instructions are there.
+        let padded = keys.checked_padded();
+        // SAFETY: `self` proves that the instructions are there; as many ranks are there as was checked.
         unsafe {
             for q in 0..6 {
-                let ranks = keys.at(q);
+                let ranks = keys.rank.as_ptr().add(q * MOST);
                 let threshold = _mm512_set1_epi16(thresholds[q] as i16);
                 let mut count = below(ranks, 0, threshold).count_ones()
                     + below(ranks, 32, threshold).count_ones()
                     + below(ranks, 64, threshold).count_ones();
                 let mut i = 96;
-                while i < ranks.len() {
+                while i < padded {
                     count += below(ranks, i, threshold).count_ones();
                     i += 32;
                 }
@@ -286,13 +282,15 @@ impl Lanes for Avx512 {
 
     #[inline(always)]
     fn members(self, keys: &Keys, q: usize, threshold: u16, set: &mut Set) {
-        // SAFETY: `self` proves that the instructions are there.
+        let padded = keys.checked_padded();
+        assert!(q < 6, "one of six stencil points");
+        // SAFETY: `self` proves that the instructions are there; as many ranks are there as was checked.
         unsafe {
-            let ranks = keys.at(q);
+            let ranks = keys.rank.as_ptr().add(q * MOST);
             let threshold = _mm512_set1_epi16(threshold as i16);
             let mut i = 0;
-            while i < ranks.len() {
-                let second = if i + 32 < ranks.len() { below(ranks, i + 32, threshold) } else { 0 };
+            while i < padded {
+                let second = if i + 32 < padded { below(ranks, i + 32, threshold) } else { 0 };
                 set[i / 64] = u64::from(below(ranks, i, threshold)) | u64::from(second) << 32;
                 i += 64;
             }
@@ -306,8 +304,56 @@ impl Lanes for Avx512 {
     }
 
     #[inline(always)]
+    fn choose(self, from: &[u32], places: u64, to: &mut [u32]) -> usize {
+        assert!(from.len() >= 64 && to.len() >= 64, "room for whole vectors");
+        let mut n = 0;
+        // SAFETY: `self` proves that the instructions are there. Four times 16 are read; and no more written, since
+        // `n` is at most 16 times the vectors done.
+        unsafe {
+            for part in 0..4 {
+                let mask = (places >> (16 * part)) as u16;
+                let ids = _mm512_loadu_si512(from.as_ptr().add(16 * part).cast());
+                _mm512_storeu_si512(to.as_mut_ptr().add(n).cast(), _mm512_maskz_compress_epi32(mask, ids));
+                n += mask.count_ones() as usize;
+            }
+        }
+        n
+    }
+
+    #[inline(always)]
+    fn fetch(self, field: &NormalField, vertex: DVec3, near: &mut Near) {
+        let triangles = field.centroids.len().min(field.normals.len());
+        assert!(near.len <= MOST && near.id.len() >= MOST && near.value.len() >= 6 * MOST, "room for vectors");
+        let value = near.value.as_mut_ptr();
+        // SAFETY: `self` proves that the instructions are there. `i` is below `near.len`, and `MOST` a multiple of
+        // eight. Only numbers below `triangles` are gathered, and a `DVec3` is three `f64` in a row.
+        unsafe {
+            let most = _mm512_set1_epi64(triangles as i64);
+            let mut i = 0;
+            while i < near.len {
+                let id = _mm512_cvtepu32_epi64(_mm256_loadu_si256(near.id.as_ptr().add(i).cast()));
+                let mask = _mm512_cmplt_epi64_mask(id, most);
+                let at = _mm512_add_epi64(id, _mm512_add_epi64(id, id));
+                let zero = _mm512_setzero_pd();
+                for axis in 0..3 {
+                    let from = field.centroids.as_ptr().cast::<f64>().add(axis);
+                    let place = _mm512_mask_i64gather_pd::<8>(zero, mask, at, from);
+                    let from = field.normals.as_ptr().cast::<f64>().add(axis);
+                    let normal = _mm512_mask_i64gather_pd::<8>(zero, mask, at, from);
+                    _mm512_storeu_pd(value.add(axis * MOST + i), _mm512_sub_pd(place, _mm512_set1_pd(vertex[axis])));
+                    _mm512_storeu_pd(value.add((3 + axis) * MOST + i), normal);
+                }
+                i += 8;
+            }
+        }
+    }
+
+    #[inline(always)]
     fn sums(self, near: &Near, weighting: &Weighting) -> [Sum; 6] {
-        // SAFETY: `self` proves that the instructions are there.
+        assert!(near.len <= MOST && near.value.len() >= 6 * MOST, "whole vectors of neighbours");
+        let value = near.value.as_ptr();
+        // SAFETY: `self` proves that the instructions are there; `i` is below `near.len`, and `MOST` a multiple of the
+        // lanes.
         unsafe {
             let offset = _mm512_set1_pd(weighting.offset_m);
             let (least, scale) = (_mm512_set1_pd(weighting.least_m2), _mm512_set1_pd(weighting.scale));
@@ -316,14 +362,14 @@ impl Lanes for Avx512 {
             let mut i = 0;
             while i < near.len {
                 let u = [
-                    load_f64(&near.value, i),
-                    load_f64(&near.value, MOST + i),
-                    load_f64(&near.value, 2 * MOST + i),
+                    load_f64(value, i),
+                    load_f64(value, MOST + i),
+                    load_f64(value, 2 * MOST + i),
                 ];
                 let (x2, y2, z2) = (_mm512_mul_pd(u[0], u[0]), _mm512_mul_pd(u[1], u[1]), _mm512_mul_pd(u[2], u[2]));
                 let rest = [_mm512_add_pd(y2, z2), _mm512_add_pd(z2, x2), _mm512_add_pd(x2, y2)];
                 for axis in 0..3 {
-                    let normal = load_f64(&near.value, (3 + axis) * MOST + i);
+                    let normal = load_f64(value, (3 + axis) * MOST + i);
                     for side in 0..2 {
                         let q = 2 * axis + side;
                         let mask = (near.of[q][i / 64] >> (i % 64)) as u8;

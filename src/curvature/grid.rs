@@ -137,7 +137,8 @@ impl Grid {
     /// Puts the centroids where their cells are; shifts the cells' starts to where they belong by doing so.
     fn scatter(&mut self, field: &NormalField, place: &[[u32; 2]]) {
         let n = place.len();
-        (self.x, self.y, self.z, self.id) = (vec![0.0; n], vec![0.0; n], vec![0.0; n], vec![0; n]);
+        let room = n + STEP;
+        (self.x, self.y, self.z, self.id) = (vec![0.0; room], vec![0.0; room], vec![0.0; room], vec![0; room]);
         for (t, (&[cell, level], &c)) in place.iter().zip(&field.centroids).enumerate() {
             let next = &mut self.cell[cell as usize + 1];
             let i = *next as usize;
@@ -177,17 +178,6 @@ impl Grid {
         DVec3::new(self.middle(0, slot[0]), self.middle(1, slot[1]), self.middle(2, slot[2]))
     }
 
-    fn run(&self, [ix, iy, iz]: [i32; 3]) -> Range<usize> {
-        let column = (iy * self.count[0] + ix) as usize;
-        let level = i64::from(iz) - i64::from(self.lowest[column]);
-        let (first, end) = (self.column[column], self.column[column + 1]);
-        if level < 0 || level >= i64::from(end - first) {
-            return 0..0;
-        }
-        let cell = first as usize + level as usize;
-        self.cell[cell] as usize..self.cell[cell + 1] as usize
-    }
-
     /// The indices of the cells along an axis that are no further than `rings` away.
     fn around(&self, axis: usize, index: i32, rings: i32) -> std::ops::RangeInclusive<i32> {
         (index - rings).max(0)..=(index + rings).min(self.count[axis] - 1)
@@ -200,19 +190,25 @@ impl Grid {
         let cell = self.cell_m as f32;
         block.reserve(most);
         let mut n = 0;
+        let levels = self.around(2, slot[2], rings);
         for iy in self.around(1, slot[1], rings) {
             for ix in self.around(0, slot[0], rings) {
-                for iz in self.around(2, slot[2], rings) {
-                    let run = self.run([ix, iy, iz]);
-                    let m = run.len();
+                let column = (iy * self.count[0] + ix) as usize;
+                let (first, end) = (self.column[column], self.column[column + 1]);
+                let lowest = self.lowest[column];
+                let from = lowest.max(*levels.start());
+                let to = levels.end().saturating_add(1).min(lowest.saturating_add((end - first) as i32));
+                for iz in from..to {
+                    let cell_at = first as usize + (iz - lowest) as usize;
+                    let (a, m) = (self.cell[cell_at] as usize, (self.cell[cell_at + 1] - self.cell[cell_at]) as usize);
                     if n + m > most {
                         return false;
                     }
                     let shift = |axis: usize, index: i32| (index - slot[axis]) as f32 * cell;
-                    moved(&self.x[run.clone()], shift(0, ix), &mut block.x[n..n + m]);
-                    moved(&self.y[run.clone()], shift(1, iy), &mut block.y[n..n + m]);
-                    moved(&self.z[run.clone()], shift(2, iz), &mut block.z[n..n + m]);
-                    block.id[n..n + m].copy_from_slice(&self.id[run]);
+                    moved(&self.x[a..], shift(0, ix), m, &mut block.x[n..]);
+                    moved(&self.y[a..], shift(1, iy), m, &mut block.y[n..]);
+                    moved(&self.z[a..], shift(2, iz), m, &mut block.z[n..]);
+                    copied(&self.id[a..], m, &mut block.id[n..]);
                     n += m;
                 }
             }
@@ -246,9 +242,25 @@ impl Grid {
     }
 }
 
+/// Numbers that are moved at a time: whole vectors, the last of which may take along what follows.
+const STEP: usize = 16;
+
 #[inline(always)]
-fn moved(from: &[f32], by: f32, to: &mut [f32]) {
-    for (a, b) in to.iter_mut().zip(from) {
-        *a = b + by;
+fn moved(from: &[f32], by: f32, count: usize, to: &mut [f32]) {
+    let padded = count.next_multiple_of(STEP);
+    for (to, from) in to[..padded].chunks_exact_mut(STEP).zip(from[..padded].chunks_exact(STEP)) {
+        for i in 0..STEP {
+            to[i] = from[i] + by;
+        }
+    }
+}
+
+#[inline(always)]
+fn copied(from: &[u32], count: usize, to: &mut [u32]) {
+    let padded = count.next_multiple_of(STEP);
+    for (to, from) in to[..padded].chunks_exact_mut(STEP).zip(from[..padded].chunks_exact(STEP)) {
+        for i in 0..STEP {
+            to[i] = from[i];
+        }
     }
 }

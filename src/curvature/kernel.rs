@@ -384,7 +384,7 @@ fn fetch<L: Lanes>(lanes: L, job: &Job<'_>, work: &mut Workspace, p: DVec3) {
     let mut n = 0usize;
     for w in 0..words {
         let s = &work.sets;
-        let mut any = s[0][w] | s[1][w] | s[2][w] | s[3][w] | s[4][w] | s[5][w];
+        let any = s[0][w] | s[1][w] | s[2][w] | s[3][w] | s[4][w] | s[5][w];
         let (word, bit) = (n / 64, n % 64);
         for q in 0..6 {
             let packed = lanes.pack(work.sets[q][w], any);
@@ -393,20 +393,10 @@ fn fetch<L: Lanes>(lanes: L, job: &Job<'_>, work: &mut Workspace, p: DVec3) {
                 near.of[q][word + 1] |= packed >> (64 - bit);
             }
         }
-        while any != 0 {
-            let t = work.ball.id[w * 64 + any.trailing_zeros() as usize] as usize;
-            let (u, normal) = (job.field.centroids[t] - p, job.field.normals[t]);
-            near.value[n] = u.x;
-            near.value[MOST + n] = u.y;
-            near.value[2 * MOST + n] = u.z;
-            near.value[3 * MOST + n] = normal.x;
-            near.value[4 * MOST + n] = normal.y;
-            near.value[5 * MOST + n] = normal.z;
-            n += 1;
-            any &= any - 1;
-        }
+        n += lanes.choose(&work.ball.id[w * 64..w * 64 + 64], any, &mut near.id[n..]);
     }
     near.len = n;
+    lanes.fetch(job.field, p, near);
 }
 
 /// The sum of one stencil point's neighbours.

@@ -6,6 +6,8 @@
 use super::buffer::{Aligned, Points};
 use super::thresholds::Thresholds;
 use super::weights::{Sum, Weighting};
+use crate::geometry::DVec3;
+use crate::tile::NormalField;
 
 /// Most candidates that a vertex may have.
 pub const MOST: usize = 1024;
@@ -34,6 +36,13 @@ impl Keys {
         len.next_multiple_of(32).max(96)
     }
 
+    /// How many are ranked, all of which are there.
+    #[inline(always)]
+    pub fn checked_padded(&self) -> usize {
+        assert!((96..=MOST).contains(&self.padded) && self.padded % 32 == 0 && self.rank.len() >= 6 * MOST, "whole vectors");
+        self.padded
+    }
+
     /// Ranks at a stencil point.
     #[inline(always)]
     pub fn at(&self, q: usize) -> &[u16] {
@@ -44,6 +53,8 @@ impl Keys {
 /// Neighbours of at least one stencil point, exactly: offsets from the vertex and normals.
 #[derive(Debug)]
 pub struct Near {
+    /// Local triangle numbers.
+    pub id: Aligned<u32>,
     /// x, y, z of the offset (metres) and of the normal, `MOST` each.
     pub value: Aligned<f64>,
     /// Which of them belong to each stencil point.
@@ -55,7 +66,7 @@ pub struct Near {
 impl Near {
     /// Room for `MOST` neighbours.
     pub fn new() -> Near {
-        Near { value: Aligned::of(6 * MOST), of: [[0; WORDS]; 6], len: 0 }
+        Near { id: Aligned::of(MOST + 64), value: Aligned::of(6 * MOST), of: [[0; WORDS]; 6], len: 0 }
     }
 }
 
@@ -88,6 +99,12 @@ pub trait Lanes: Copy + Send + Sync {
     /// The bits of `word` at the places that `places` has, moved together.
     fn pack(self, word: u64, places: u64) -> u64;
 
+    /// Puts the numbers (64 of them) at these places together; returns how many.
+    fn choose(self, from: &[u32], places: u64, to: &mut [u32]) -> usize;
+
+    /// Fetches offsets from a vertex and normals of the numbered triangles.
+    fn fetch(self, field: &NormalField, vertex: DVec3, near: &mut Near);
+
     /// Sums at the six stencil points.
     fn sums(self, near: &Near, weighting: &Weighting) -> [Sum; 6];
 }
@@ -114,6 +131,34 @@ fn keep(all: &Points, kept: &mut Points, limit: f32, relative: [f32; 3], distanc
         n += usize::from(distance2(x, y, z) <= limit);
     }
     kept.len = n;
+}
+
+/// [`Lanes::choose`], one by one.
+#[inline(always)]
+pub fn choose(from: &[u32], mut places: u64, to: &mut [u32]) -> usize {
+    let mut n = 0;
+    while places != 0 {
+        to[n] = from[places.trailing_zeros() as usize];
+        n += 1;
+        places &= places - 1;
+    }
+    n
+}
+
+/// [`Lanes::fetch`], one by one.
+#[inline(always)]
+pub fn fetch(field: &NormalField, vertex: DVec3, near: &mut Near) {
+    let value: &mut [f64] = &mut near.value;
+    let (x, value) = value.split_at_mut(MOST);
+    let (y, value) = value.split_at_mut(MOST);
+    let (z, value) = value.split_at_mut(MOST);
+    let (nx, value) = value.split_at_mut(MOST);
+    let (ny, nz) = value.split_at_mut(MOST);
+    for (i, &t) in near.id[..near.len].iter().enumerate() {
+        let (u, normal) = (field.centroids[t as usize] - vertex, field.normals[t as usize]);
+        (x[i], y[i], z[i]) = (u.x, u.y, u.z);
+        (nx[i], ny[i], nz[i]) = (normal.x, normal.y, normal.z);
+    }
 }
 
 impl Lanes for Plain {
@@ -194,6 +239,16 @@ impl Lanes for Plain {
             places &= places - 1;
         }
         packed
+    }
+
+    #[inline(always)]
+    fn choose(self, from: &[u32], places: u64, to: &mut [u32]) -> usize {
+        choose(from, places, to)
+    }
+
+    #[inline(always)]
+    fn fetch(self, field: &NormalField, vertex: DVec3, near: &mut Near) {
+        fetch(field, vertex, near);
     }
 
     #[inline(always)]

@@ -16,6 +16,9 @@ pub const COMPLETE: f64 = 65_500.0;
 /// Highest threshold: those undecided at it are still complete.
 const HIGHEST: i32 = 65_498;
 
+/// Adding it rounds a number below 2^22 to an integer in the low bits: vectors have no saturating conversion.
+const INTEGER: f32 = 12_582_912.0;
+
 /// Thresholds at the six stencil points; and two idle lanes, which make a vector full.
 pub type Thresholds = [i32; 8];
 
@@ -52,7 +55,7 @@ pub fn search<L: Lanes>(lanes: L, keys: &Keys, k: i32, at: &mut Thresholds) -> b
             let next = if next < h - 1.0 { next } else { h - 1.0 };
             let next = if next > l + 1.0 { next } else { l + 1.0 };
             let stuck = high[q] - low[q] <= 1;
-            let next = if stuck { high[q] } else { next as i32 };
+            let next = if stuck { high[q] } else { (next + INTEGER).to_bits() as i32 - INTEGER.to_bits() as i32 };
             at[q] = if over | under { next } else { at[q] };
             open |= i32::from((over | under) & !stuck);
             lacking |= i32::from(stuck & (high[q] > HIGHEST));
