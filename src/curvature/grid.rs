@@ -42,19 +42,23 @@ fn few_bits(side_m: f64) -> f64 {
     f64::from_bits(side_m.to_bits() & !((1 << 41) - 1))
 }
 
-/// Where nearly all centroids are on one axis: the middle 98 in 100 and as much again on both sides.
-fn window(field: &NormalField, axis: usize) -> [f64; 2] {
+/// Where nearly all centroids are: along each axis, the middle 98 in 100 and as much again on both sides.
+fn window(field: &NormalField) -> [[f64; 2]; 3] {
     let all = &field.centroids;
-    let step = (all.len() / SAMPLE).max(1);
-    let mut sample: Vec<f64> = all.iter().step_by(step).map(|c| c[axis]).collect();
-    sample.sort_unstable_by(f64::total_cmp);
-    let (low, high) = (sample[sample.len() / 100], sample[sample.len() - 1 - sample.len() / 100]);
-    let [mut least, mut most] = [f64::INFINITY, f64::NEG_INFINITY];
-    for c in all {
-        (least, most) = (least.min(c[axis]), most.max(c[axis]));
+    let (mut least, mut most) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for &c in all {
+        (least, most) = (least.min(c), most.max(c));
     }
-    let spare = high - low;
-    [least.max(low - spare), most.min(high + spare)]
+    let step = (all.len() / SAMPLE).max(1);
+    let mut sample = Vec::with_capacity(2 * SAMPLE);
+    [0, 1, 2].map(|axis| {
+        sample.clear();
+        sample.extend(all.iter().step_by(step).map(|c| c[axis]));
+        sample.sort_unstable_by(f64::total_cmp);
+        let (low, high) = (sample[sample.len() / 100], sample[sample.len() - 1 - sample.len() / 100]);
+        let spare = high - low;
+        [least[axis].max(low - spare), most[axis].min(high + spare)]
+    })
 }
 
 impl Grid {
@@ -64,7 +68,7 @@ impl Grid {
         if field.centroids.is_empty() || !side_m.is_normal() || side_m < 1e-12 {
             return None;
         }
-        let windows = [0, 1, 2].map(|axis| window(field, axis));
+        let windows = window(field);
         let mut side_m = side_m;
         let most = field.centroids.len() as f64 + 64.0;
         loop {
@@ -236,6 +240,7 @@ impl Grid {
     }
 
     /// A bound on the coordinates that rounding errors are proportional to, metres.
+    #[inline(always)]
     pub fn magnitude_m(&self) -> f64 {
         let far = self.base + DVec3::new(f64::from(self.count[0]), f64::from(self.count[1]), f64::from(self.count[2])) * self.cell_m;
         self.base.abs().max(far.abs()).max_element()

@@ -11,7 +11,7 @@ use crate::geometry::DVec3;
 use crate::tile::NormalField;
 
 /// Side of a cell in mean triangle sides.
-pub const CELL_SIDES: f64 = 3.0;
+pub const CELL_SIDES: f64 = 3.5;
 /// Most candidates of a block.
 const BLOCK: usize = 1 << 15;
 
@@ -35,6 +35,7 @@ pub struct Workspace {
     queue: Vec<(i32, u32)>,
     block: Points,
     near: Points,
+    close: Vec<(u32, u32)>,
 }
 
 /// Vertices of one column.
@@ -57,6 +58,7 @@ pub fn work<L: Lanes>(lanes: L, column: &mut Column<'_, '_>) {
     work.queue.clear();
     work.queue.extend((0..vertices.len() as u32).map(|i| (job.grid.slot(point(i))[2], i)));
     work.queue.sort_unstable();
+    work.close.clear();
     let mut level = None;
     let mut whole = false;
     for &(iz, i) in &work.queue {
@@ -67,32 +69,44 @@ pub fn work<L: Lanes>(lanes: L, column: &mut Column<'_, '_>) {
             whole = job.grid.gather(slot, 1, BLOCK, &mut work.block);
         }
         let at = p - job.grid.centre(slot);
-        let value = if whole { vertex(lanes, job, &work.block, &mut work.near, (slot, at, p)) } else { None };
-        found[i as usize] = match value {
-            Some(d) => Some(d).filter(|&d| d < job.field.loaded.margin_m(p)),
-            None => job.reserve.nearest_m(p, job.side_m),
-        };
+        if whole && candidates(lanes, job, &work.block, &mut work.near, (slot, at)) {
+            work.close.extend(work.near.id[..work.near.len].iter().map(|&t| (i, t)));
+        } else {
+            found[i as usize] = job.reserve.nearest_m(p, job.side_m);
+        }
+    }
+    settle(job, &work.close, found, point);
+}
+
+/// Exact distances of the candidates (pairs of vertex and triangle, in the order of vertices). Apart from the search
+/// for them, so that the processor waits for many of them at once.
+#[inline(always)]
+fn settle(job: &Job<'_>, close: &[(u32, u32)], found: &mut [Option<f64>], point: impl Fn(u32) -> DVec3) {
+    let mut least = (u32::MAX, f64::INFINITY);
+    for &(i, t) in close {
+        let d2 = distance2(job.field.centroids[t as usize], point(i));
+        least = if i == least.0 && least.1 < d2 { least } else { (i, d2) };
+        found[i as usize] = Some(least.1.sqrt()).filter(|&d| d < job.field.loaded.margin_m(point(i)));
     }
 }
 
-/// Exact distance to the nearest centroid, if the block surely holds it.
+/// Finds the candidates among which the nearest centroid is; false where the block may not hold it.
 #[inline(always)]
-fn vertex<L: Lanes>(
+fn candidates<L: Lanes>(
     lanes: L,
     job: &Job<'_>,
     block: &Points,
     near: &mut Points,
-    (slot, at, p): ([i32; 3], DVec3, DVec3),
-) -> Option<f64> {
+    (slot, at): ([i32; 3], DVec3),
+) -> bool {
     let here = at.as_vec3().to_array();
     let least_m = f64::from(lanes.least(block, here)).sqrt();
     let size = at.abs().max_element() + least_m + job.grid.cell_m;
     let each = f64::from(f32::EPSILON) * 2.0 * size + 8.0 * f64::EPSILON * (job.grid.magnitude_m() + size);
     let limit_m = least_m * (1.0 + 1e-6) + 8.0 * each;
     if limit_m >= job.grid.reach_m(slot, 1, at) || !least_m.is_finite() {
-        return None;
+        return false;
     }
     lanes.keep_ball(block, here, (limit_m * limit_m) as f32, near);
-    let exact = near.id[..near.len].iter().map(|&t| distance2(job.field.centroids[t as usize], p));
-    Some(exact.fold(f64::INFINITY, f64::min).sqrt())
+    near.len > 0
 }
