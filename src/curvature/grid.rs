@@ -253,19 +253,21 @@ const STEP: usize = 16;
 #[inline(always)]
 fn moved(from: &[f32], by: f32, count: usize, to: &mut [f32]) {
     let padded = count.next_multiple_of(STEP);
-    for (to, from) in to[..padded].chunks_exact_mut(STEP).zip(from[..padded].chunks_exact(STEP)) {
-        for i in 0..STEP {
-            to[i] = from[i] + by;
+    let (to, from) = (to[..padded].as_chunks_mut::<STEP>().0, from[..padded].as_chunks::<STEP>().0);
+    for (to, from) in to.iter_mut().zip(from) {
+        let mut step = *from;
+        for x in &mut step {
+            *x += by;
         }
+        *to = step;
     }
 }
 
 #[inline(always)]
 fn copied(from: &[u32], count: usize, to: &mut [u32]) {
     let padded = count.next_multiple_of(STEP);
-    for (to, from) in to[..padded].chunks_exact_mut(STEP).zip(from[..padded].chunks_exact(STEP)) {
-        for i in 0..STEP {
-            to[i] = from[i];
-        }
+    let (to, from) = (to[..padded].as_chunks_mut::<STEP>().0, from[..padded].as_chunks::<STEP>().0);
+    for (to, from) in to.iter_mut().zip(from) {
+        *to = *from;
     }
 }
