@@ -62,7 +62,12 @@ impl Cloud {
     }
 }
 
-fn sheet(random: &mut Random, count: usize, width: f64, mut height: impl FnMut(&mut Random, f64, f64) -> f64) -> Vec<DVec3> {
+fn sheet(
+    random: &mut Random,
+    count: usize,
+    width: f64,
+    mut height: impl FnMut(&mut Random, f64, f64) -> f64,
+) -> Vec<DVec3> {
     (0..count)
         .map(|_| {
             let (x, y) = (random.within(0.0, width), random.within(0.0, width));
@@ -87,7 +92,8 @@ fn clouds() -> Vec<Cloud> {
     }
     all.push(Cloud::around("every centroid four times", shuffled, 0.5, 120));
 
-    let uneven = (0..4000).map(|_| DVec3::new(40.0 * r.unit().powi(6), 40.0 * r.unit().powi(4), 0.2 * r.unit())).collect();
+    let uneven =
+        (0..4000).map(|_| DVec3::new(40.0 * r.unit().powi(6), 40.0 * r.unit().powi(4), 0.2 * r.unit())).collect();
     all.push(Cloud::around("uneven density", uneven, 0.5, 250));
 
     let layers = sheet(&mut r, 3000, 40.0, |r, _, _| if r.unit() < 0.5 { 0.0 } else { 1e-7 });
@@ -133,7 +139,7 @@ fn reference(field: &NormalField, p: DVec3, s: &Stencil) -> Option<f64> {
     let mut means = [0.0; 6];
     for q in 0..6 {
         let shift = DVec3::AXES[q / 2] * s.offset_m;
-        let place = if q % 2 == 0 { p + shift } else { p - shift };
+        let place = if q.is_multiple_of(2) { p + shift } else { p - shift };
         let mut all: Vec<(f64, usize)> = field
             .centroids
             .iter()
@@ -151,7 +157,7 @@ fn reference(field: &NormalField, p: DVec3, s: &Stencil) -> Option<f64> {
         for (_, t) in all {
             let u = field.centroids[t] - p;
             let axis = q / 2;
-            let a = if q % 2 == 0 { u[axis] - s.offset_m } else { u[axis] + s.offset_m };
+            let a = if q.is_multiple_of(2) { u[axis] - s.offset_m } else { u[axis] + s.offset_m };
             let (b, c) = (u[(axis + 1) % 3], u[(axis + 2) % 3]);
             let w = weight(a * a + (b * b + c * c), s.spacing_m);
             weights += w.round_ties_even() as i64;
@@ -209,8 +215,9 @@ fn a_field_cut_to_a_box_gives_the_same_bits_or_none() {
         let at = |axis: usize, share: f64| sides[axis][(share * (sides[axis].len() - 1) as f64) as usize];
         for (low, high) in [(0.11, 0.83), (0.37, 0.71)] {
             let loaded = PlanBox { min: [at(0, low), at(1, low)], max: [at(0, high), f64::INFINITY] };
-            let inside: Vec<usize> =
-                (0..cloud.field.centroids.len()).filter(|&t| loaded.margin_m(cloud.field.centroids[t]) >= 0.0).collect();
+            let inside: Vec<usize> = (0..cloud.field.centroids.len())
+                .filter(|&t| loaded.margin_m(cloud.field.centroids[t]) >= 0.0)
+                .collect();
             let cut = NormalField {
                 centroids: inside.iter().map(|&t| cloud.field.centroids[t]).collect(),
                 normals: inside.iter().map(|&t| cloud.field.normals[t]).collect(),

@@ -1,4 +1,5 @@
 //! The kernel's vector steps in AVX2.
+#![allow(clippy::needless_range_loop, reason = "stencil points and axes run through several arrays at once")]
 #![allow(unsafe_code)]
 
 use super::buffer::{Points, SLACK};
@@ -12,11 +13,11 @@ use std::arch::x86_64::*;
 
 /// Proof that the processor has AVX2, FMA, BMI2 and what comes with them.
 #[derive(Debug, Clone, Copy)]
-pub struct Avx2(());
+pub(super) struct Avx2(());
 
 impl Avx2 {
     /// The proof, if the processor has them.
-    pub fn detect() -> Option<Avx2> {
+    pub(super) fn detect() -> Option<Avx2> {
         let has = is_x86_feature_detected!("avx2")
             && is_x86_feature_detected!("fma")
             && is_x86_feature_detected!("bmi1")

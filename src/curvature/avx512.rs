@@ -1,4 +1,5 @@
 //! The kernel's vector steps in AVX-512.
+#![allow(clippy::needless_range_loop, reason = "stencil points and axes run through several arrays at once")]
 #![allow(unsafe_code)]
 
 use super::buffer::{Points, SLACK};
@@ -12,11 +13,11 @@ use std::arch::x86_64::*;
 
 /// Proof that the processor has AVX-512 F, BW, DQ and VL, and what comes with them.
 #[derive(Debug, Clone, Copy)]
-pub struct Avx512(());
+pub(super) struct Avx512(());
 
 impl Avx512 {
     /// The proof, if the processor has them.
-    pub fn detect() -> Option<Avx512> {
+    pub(super) fn detect() -> Option<Avx512> {
         let has = is_x86_feature_detected!("avx512f")
             && is_x86_feature_detected!("avx512bw")
             && is_x86_feature_detected!("avx512dq")
@@ -72,12 +73,7 @@ unsafe fn load_f64(from: *const f64, i: usize) -> __m512d {
 ///
 /// SAFETY contract: the instructions are there.
 #[inline(always)]
-unsafe fn keep(
-    all: &Points,
-    kept: &mut Points,
-    origin: [f32; 3],
-    near: impl Fn(__m512, __m512, __m512) -> __mmask16,
-) {
+unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], near: impl Fn(__m512, __m512, __m512) -> __mmask16) {
     kept.reserve(all.len);
     assert!(all.fits(all.len) && kept.fits(all.len), "room for the candidates and the slack");
     let (xs, ys, zs, ids) = (all.x.as_ptr(), all.y.as_ptr(), all.z.as_ptr(), all.id.as_ptr());
@@ -191,7 +187,8 @@ impl Lanes for Avx512 {
         unsafe {
             let ([cx, cy, cz], [hx, hy, hz]) = (centre.map(|c| _mm512_set1_ps(c)), half.map(|h| _mm512_set1_ps(h)));
             let limit = _mm512_set1_ps(limit);
-            let beyond = |x, c, h| _mm512_max_ps(_mm512_sub_ps(_mm512_abs_ps(_mm512_sub_ps(x, c)), h), _mm512_setzero_ps());
+            let beyond =
+                |x, c, h| _mm512_max_ps(_mm512_sub_ps(_mm512_abs_ps(_mm512_sub_ps(x, c)), h), _mm512_setzero_ps());
             keep(all, kept, [0.0; 3], |x, y, z| {
                 let (x, y, z) = (beyond(x, cx, hx), beyond(y, cy, hy), beyond(z, cz, hz));
                 let d2 = _mm512_fmadd_ps(x, x, _mm512_fmadd_ps(y, y, _mm512_mul_ps(z, z)));
@@ -361,11 +358,7 @@ impl Lanes for Avx512 {
             let mut sums = [[_mm512_setzero_si512(); 2]; 6];
             let mut i = 0;
             while i < near.len {
-                let u = [
-                    load_f64(value, i),
-                    load_f64(value, MOST + i),
-                    load_f64(value, 2 * MOST + i),
-                ];
+                let u = [load_f64(value, i), load_f64(value, MOST + i), load_f64(value, 2 * MOST + i)];
                 let (x2, y2, z2) = (_mm512_mul_pd(u[0], u[0]), _mm512_mul_pd(u[1], u[1]), _mm512_mul_pd(u[2], u[2]));
                 let rest = [_mm512_add_pd(y2, z2), _mm512_add_pd(z2, x2), _mm512_add_pd(x2, y2)];
                 for axis in 0..3 {
@@ -375,7 +368,8 @@ impl Lanes for Avx512 {
                         let mask = (near.of[q][i / 64] >> (i % 64)) as u8;
                         let a = if side == 0 { _mm512_sub_pd(u[axis], offset) } else { _mm512_add_pd(u[axis], offset) };
                         let w = weight(a, rest[axis], least, scale);
-                        let (weighted, weights) = (_mm512_add_pd(_mm512_mul_pd(w, normal), round), _mm512_add_pd(w, round));
+                        let (weighted, weights) =
+                            (_mm512_add_pd(_mm512_mul_pd(w, normal), round), _mm512_add_pd(w, round));
                         let [sum_n, sum] = sums[q];
                         sums[q] = [
                             _mm512_mask_add_epi64(sum_n, mask, sum_n, _mm512_castpd_si512(weighted)),

@@ -3,14 +3,14 @@
 use std::ops::{Deref, DerefMut};
 
 /// Lanes that a vector store may write beyond the last candidate, and that hold far points after padding.
-pub const SLACK: usize = 128;
+pub(super) const SLACK: usize = 128;
 
 /// Coordinate of padding: so far away that no candidate is beyond it, and its square is still finite.
 const FAR: f32 = 1e15;
 
 /// A slice that starts at a cache line, since vector loads that straddle two lines cost twice.
 #[derive(Debug, Default)]
-pub struct Aligned<T> {
+pub(super) struct Aligned<T> {
     data: Vec<T>,
     start: usize,
     len: usize,
@@ -18,7 +18,7 @@ pub struct Aligned<T> {
 
 impl<T: Copy + Default> Aligned<T> {
     /// Makes the slice at least `len` long. Contents are lost when it grows.
-    pub fn grow(&mut self, len: usize) {
+    pub(super) fn grow(&mut self, len: usize) {
         if self.len < len {
             self.data = vec![T::default(); len + 64];
             self.start = self.data.as_ptr().align_offset(64).min(64);
@@ -27,7 +27,7 @@ impl<T: Copy + Default> Aligned<T> {
     }
 
     /// A new slice.
-    pub fn of(len: usize) -> Self {
+    pub(super) fn of(len: usize) -> Self {
         let mut new = Aligned { data: Vec::new(), start: 0, len: 0 };
         new.grow(len);
         new
@@ -51,22 +51,22 @@ impl<T> DerefMut for Aligned<T> {
 
 /// Candidates: coordinates relative to some centre (or to a vertex) and local triangle numbers.
 #[derive(Debug, Default)]
-pub struct Points {
+pub(super) struct Points {
     /// East, metres.
-    pub x: Aligned<f32>,
+    pub(super) x: Aligned<f32>,
     /// North, metres.
-    pub y: Aligned<f32>,
+    pub(super) y: Aligned<f32>,
     /// Up, metres.
-    pub z: Aligned<f32>,
+    pub(super) z: Aligned<f32>,
     /// Local triangle numbers.
-    pub id: Aligned<u32>,
+    pub(super) id: Aligned<u32>,
     /// How many there are; what follows them is padding.
-    pub len: usize,
+    pub(super) len: usize,
 }
 
 impl Points {
     /// Room for `len` points and the slack.
-    pub fn reserve(&mut self, len: usize) {
+    pub(super) fn reserve(&mut self, len: usize) {
         self.x.grow(len + SLACK);
         self.y.grow(len + SLACK);
         self.z.grow(len + SLACK);
@@ -75,14 +75,14 @@ impl Points {
 
     /// Whether `len` points and the slack fit.
     #[inline(always)]
-    pub fn fits(&self, len: usize) -> bool {
+    pub(super) fn fits(&self, len: usize) -> bool {
         let room = len + SLACK;
         self.x.len() >= room && self.y.len() >= room && self.z.len() >= room && self.id.len() >= room
     }
 
     /// Far points from the last candidate on, so that whole vectors can be read.
     #[inline(always)]
-    pub fn pad(&mut self, to: usize) {
+    pub(super) fn pad(&mut self, to: usize) {
         let n = self.len;
         self.x[n..to].fill(FAR);
         self.y[n..to].fill(FAR);

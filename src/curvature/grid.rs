@@ -11,20 +11,19 @@
 use super::buffer::Points;
 use crate::geometry::DVec3;
 use crate::tile::NormalField;
-use std::ops::Range;
 
 /// Points looked at to find the window.
 const SAMPLE: usize = 4096;
 
 /// Centroids of a field by cell.
-pub struct Grid {
+pub(super) struct Grid {
     /// Lowest corner of the window, metres.
     base: DVec3,
     /// Side of a cell, metres; few bits, so that multiples of it are exact in `f32`.
-    pub cell_m: f64,
+    pub(super) cell_m: f64,
     per_m: f64,
     /// Cells along x, y and z.
-    pub count: [i32; 3],
+    pub(super) count: [i32; 3],
     /// First cell of each column.
     column: Vec<u32>,
     /// Lowest level of each column.
@@ -64,7 +63,7 @@ fn window(field: &NormalField) -> [[f64; 2]; 3] {
 impl Grid {
     /// Sorts a field's centroids into cells of about `side_m`, larger where there would be more cells than
     /// centroids. None for a field without centroids or without sense.
-    pub fn new(field: &NormalField, side_m: f64) -> Option<Grid> {
+    pub(super) fn new(field: &NormalField, side_m: f64) -> Option<Grid> {
         if field.centroids.is_empty() || !side_m.is_normal() || side_m < 1e-12 {
             return None;
         }
@@ -157,7 +156,7 @@ impl Grid {
     }
 
     /// Columns in plan.
-    pub fn columns(&self) -> usize {
+    pub(super) fn columns(&self) -> usize {
         self.count[0] as usize * self.count[1] as usize
     }
 
@@ -173,12 +172,12 @@ impl Grid {
 
     /// The cell that a place belongs to.
     #[inline(always)]
-    pub fn slot(&self, p: DVec3) -> [i32; 3] {
+    pub(super) fn slot(&self, p: DVec3) -> [i32; 3] {
         [self.index(0, p.x), self.index(1, p.y), self.index(2, p.z)]
     }
 
     /// Centre of a cell, metres.
-    pub fn centre(&self, slot: [i32; 3]) -> DVec3 {
+    pub(super) fn centre(&self, slot: [i32; 3]) -> DVec3 {
         DVec3::new(self.middle(0, slot[0]), self.middle(1, slot[1]), self.middle(2, slot[2]))
     }
 
@@ -190,7 +189,7 @@ impl Grid {
     /// Gathers all centroids of the cells up to `rings` away, relative to the middle cell's centre. False, and
     /// not all of them, where they are more than `most`.
     #[inline(always)]
-    pub fn gather(&self, slot: [i32; 3], rings: i32, most: usize, block: &mut Points) -> bool {
+    pub(super) fn gather(&self, slot: [i32; 3], rings: i32, most: usize, block: &mut Points) -> bool {
         let cell = self.cell_m as f32;
         block.reserve(most);
         let mut n = 0;
@@ -225,7 +224,7 @@ impl Grid {
     /// How far around a place (relative to its cell's centre) nothing is missed in a gathered block, metres:
     /// infinite where the block holds all.
     #[inline(always)]
-    pub fn reach_m(&self, slot: [i32; 3], rings: i32, at: DVec3) -> f64 {
+    pub(super) fn reach_m(&self, slot: [i32; 3], rings: i32, at: DVec3) -> f64 {
         let half = (f64::from(rings) + 0.499_999) * self.cell_m;
         let mut reach = f64::INFINITY;
         for axis in 0..3 {
@@ -241,8 +240,9 @@ impl Grid {
 
     /// A bound on the coordinates that rounding errors are proportional to, metres.
     #[inline(always)]
-    pub fn magnitude_m(&self) -> f64 {
-        let far = self.base + DVec3::new(f64::from(self.count[0]), f64::from(self.count[1]), f64::from(self.count[2])) * self.cell_m;
+    pub(super) fn magnitude_m(&self) -> f64 {
+        let far = self.base
+            + DVec3::new(f64::from(self.count[0]), f64::from(self.count[1]), f64::from(self.count[2])) * self.cell_m;
         self.base.abs().max(far.abs()).max_element()
     }
 }

@@ -1,8 +1,8 @@
 //! Which vector instructions the processor has, found out at run time.
 
+use super::lanes::{Lanes, Plain};
 #[cfg(target_arch = "x86_64")]
 use super::{avx2::Avx2, avx512::Avx512};
-use super::lanes::{Lanes, Plain};
 
 /// Vector instructions that the curvature kernel is written for. The results do not depend on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -10,6 +10,7 @@
 //! compared by (distance², number) in `f64`. Where the ball leaves the gathered block, a wider block is gathered;
 //! where nothing helps, [`super::neighbours`] searches. The set is the same whichever way it was found, and so are
 //! the sums, bit for bit.
+#![allow(clippy::needless_range_loop, reason = "stencil points and axes run through several arrays at once")]
 
 use super::Stencil;
 use super::buffer::Points;
@@ -31,23 +32,23 @@ const SPARE: f64 = 1.04;
 const RIM: f64 = 1e-5;
 
 /// Everything that all columns share.
-pub struct Job<'a> {
+pub(super) struct Job<'a> {
     /// The centroids.
-    pub grid: &'a Grid,
+    pub(super) grid: &'a Grid,
     /// The field they come from.
-    pub field: &'a NormalField,
+    pub(super) field: &'a NormalField,
     /// Where the divergence is wanted.
-    pub points: &'a [DVec3],
+    pub(super) points: &'a [DVec3],
     /// The stencil.
-    pub stencil: &'a Stencil,
+    pub(super) stencil: &'a Stencil,
     /// Its weights.
-    pub weighting: Weighting,
+    pub(super) weighting: Weighting,
     /// The exact search, if needed.
-    pub reserve: &'a Reserve<'a>,
+    pub(super) reserve: &'a Reserve<'a>,
 }
 
 /// Buffers of a thread, and what the vertex before needed.
-pub struct Workspace {
+pub(super) struct Workspace {
     queue: Vec<(u32, u32)>,
     block: Points,
     group: Points,
@@ -59,13 +60,11 @@ pub struct Workspace {
     radius_m: f64,
     /// Squared distances of the thresholds, m².
     last_m2: [f64; 8],
-    /// How many vertices took the way out: undecided ranks, a wider block, the exact search.
-    pub tally: [u64; 3],
 }
 
 impl Workspace {
     /// Empty buffers.
-    pub fn new(stencil: &Stencil) -> Workspace {
+    pub(super) fn new(stencil: &Stencil) -> Workspace {
         let typical = stencil.typical_radius_m();
         Workspace {
             queue: Vec::new(),
@@ -77,21 +76,20 @@ impl Workspace {
             near: Near::new(),
             radius_m: 1.1 * (typical.hypot(stencil.offset_m) + stencil.offset_m),
             last_m2: [typical * typical; 8],
-            tally: [0; 3],
         }
     }
 }
 
 /// Vertices of one column.
-pub struct Column<'a, 'j> {
+pub(super) struct Column<'a, 'j> {
     /// What all columns share.
-    pub job: &'a Job<'j>,
+    pub(super) job: &'a Job<'j>,
     /// Numbers of the vertices.
-    pub vertices: &'a [u32],
+    pub(super) vertices: &'a [u32],
     /// Their divergence, 1/m.
-    pub found: &'a mut [Option<f64>],
+    pub(super) found: &'a mut [Option<f64>],
     /// Buffers.
-    pub work: &'a mut Workspace,
+    pub(super) work: &'a mut Workspace,
 }
 
 enum Outcome {
@@ -114,7 +112,7 @@ struct Block {
 
 /// Works a column.
 #[inline(always)]
-pub fn work<L: Lanes>(lanes: L, column: &mut Column<'_, '_>) {
+pub(super) fn work<L: Lanes>(lanes: L, column: &mut Column<'_, '_>) {
     let job = column.job;
     let mut queue = std::mem::take(&mut column.work.queue);
     queue.clear();
@@ -180,7 +178,6 @@ fn cell<L: Lanes>(lanes: L, column: &mut Column<'_, '_>, queue: &[(u32, u32)]) {
                     Outcome::Known(value) => column.found[e.1 as usize] = value,
                     Outcome::Further => later.push(*e),
                     Outcome::Hopeless => {
-                        column.work.tally[2] += 1;
                         column.found[e.1 as usize] = job.searched(point(e));
                     }
                 }
@@ -190,12 +187,10 @@ fn cell<L: Lanes>(lanes: L, column: &mut Column<'_, '_>, queue: &[(u32, u32)]) {
         if later.is_empty() {
             return;
         }
-        column.work.tally[1] += later.len() as u64;
         now.clear();
         std::mem::swap(&mut now, &mut later);
     }
     for e in now.iter().chain(&later) {
-        column.work.tally[2] += 1;
         column.found[e.1 as usize] = job.searched(point(e));
     }
 }
@@ -321,7 +316,6 @@ fn choose<L: Lanes>(lanes: L, job: &Job<'_>, work: &mut Workspace, p: DVec3, thr
         all &= clear(q);
     }
     if !all {
-        work.tally[0] += 1;
         for q in 0..6 {
             if !clear(q) {
                 decide(job, work, p, q, thresholds[q]);
@@ -332,9 +326,9 @@ fn choose<L: Lanes>(lanes: L, job: &Job<'_>, work: &mut Workspace, p: DVec3, thr
 
 /// Where a stencil point is: +x, -x, +y, -y, +z, -z.
 #[inline(always)]
-pub fn stencil_point(p: DVec3, q: usize, offset_m: f64) -> DVec3 {
+pub(super) fn stencil_point(p: DVec3, q: usize, offset_m: f64) -> DVec3 {
     let shift = DVec3::AXES[q / 2] * offset_m;
-    if q % 2 == 0 { p + shift } else { p - shift }
+    if q.is_multiple_of(2) { p + shift } else { p - shift }
 }
 
 /// Decides between candidates of about the same distance by (distance², number) in `f64`.
@@ -400,21 +394,12 @@ fn fetch<L: Lanes>(lanes: L, job: &Job<'_>, work: &mut Workspace, p: DVec3) {
 }
 
 /// The sum of one stencil point's neighbours.
-pub fn sum_of(field: &NormalField, found: &[(f64, u32)], p: DVec3, q: usize, weighting: &Weighting) -> Sum {
-    let side = if q % 2 == 0 { 1.0 } else { -1.0 };
+pub(super) fn sum_of(field: &NormalField, found: &[(f64, u32)], p: DVec3, q: usize, weighting: &Weighting) -> Sum {
+    let side = if q.is_multiple_of(2) { 1.0 } else { -1.0 };
     let mut sum = Sum::default();
     for &(_, t) in found {
         let u = field.centroids[t as usize] - p;
         sum.add(weighting.weight(weighting.distance2(u, q / 2, side)), field.normals[t as usize][q / 2]);
     }
     sum
-}
-/// TEMP
-pub static TALLY: [std::sync::atomic::AtomicU64; 3] = [const { std::sync::atomic::AtomicU64::new(0) }; 3];
-impl Drop for Workspace {
-    fn drop(&mut self) {
-        for i in 0..3 {
-            TALLY[i].fetch_add(self.tally[i], std::sync::atomic::Ordering::Relaxed);
-        }
-    }
 }

@@ -2,6 +2,7 @@
 //!
 //! Everything but [`Lanes::sums`] is a filter whose errors the caller bounds: implementations may round as they
 //! like. Sums must be the same bits in all.
+#![allow(clippy::needless_range_loop, reason = "stencil points and axes run through several arrays at once")]
 
 use super::buffer::{Aligned, Points};
 use super::thresholds::Thresholds;
@@ -10,68 +11,71 @@ use crate::geometry::DVec3;
 use crate::tile::NormalField;
 
 /// Most candidates that a vertex may have.
-pub const MOST: usize = 1024;
+pub(super) const MOST: usize = 1024;
 /// Words of a set of candidates.
-pub const WORDS: usize = MOST / 64;
+pub(super) const WORDS: usize = MOST / 64;
 /// A set of candidates: bit i for candidate i.
-pub type Set = [u64; WORDS];
+pub(super) type Set = [u64; WORDS];
 
 /// Ranks of the candidates at the six stencil points: squared distances, scaled and cut to 16 bits.
 #[derive(Debug)]
-pub struct Keys {
+pub(super) struct Keys {
     /// `MOST` for each of +x, -x, +y, -y, +z, -z; from `padded` on, undefined.
-    pub rank: Aligned<u16>,
+    pub(super) rank: Aligned<u16>,
     /// Candidates with padding, a multiple of 32 and at least 96; padding has the highest rank.
-    pub padded: usize,
+    pub(super) padded: usize,
 }
 
 impl Keys {
     /// Room for `MOST` candidates.
-    pub fn new() -> Keys {
+    pub(super) fn new() -> Keys {
         Keys { rank: Aligned::of(6 * MOST), padded: 0 }
     }
 
     /// How many candidates are ranked, with padding.
-    pub fn padding(len: usize) -> usize {
+    pub(super) fn padding(len: usize) -> usize {
         len.next_multiple_of(32).max(96)
     }
 
     /// How many are ranked, all of which are there.
     #[inline(always)]
-    pub fn checked_padded(&self) -> usize {
-        assert!((96..=MOST).contains(&self.padded) && self.padded % 32 == 0 && self.rank.len() >= 6 * MOST, "whole vectors");
+    pub(super) fn checked_padded(&self) -> usize {
+        assert!(
+            (96..=MOST).contains(&self.padded) && self.padded.is_multiple_of(32) && self.rank.len() >= 6 * MOST,
+            "whole vectors"
+        );
         self.padded
     }
 
     /// Ranks at a stencil point.
     #[inline(always)]
-    pub fn at(&self, q: usize) -> &[u16] {
+    pub(super) fn at(&self, q: usize) -> &[u16] {
         &self.rank[q * MOST..q * MOST + self.padded]
     }
 }
 
 /// Neighbours of at least one stencil point, exactly: offsets from the vertex and normals.
 #[derive(Debug)]
-pub struct Near {
+pub(super) struct Near {
     /// Local triangle numbers.
-    pub id: Aligned<u32>,
+    pub(super) id: Aligned<u32>,
     /// x, y, z of the offset (metres) and of the normal, `MOST` each.
-    pub value: Aligned<f64>,
+    pub(super) value: Aligned<f64>,
     /// Which of them belong to each stencil point.
-    pub of: [Set; 6],
+    pub(super) of: [Set; 6],
     /// How many.
-    pub len: usize,
+    pub(super) len: usize,
 }
 
 impl Near {
     /// Room for `MOST` neighbours.
-    pub fn new() -> Near {
+    pub(super) fn new() -> Near {
         Near { id: Aligned::of(MOST + 64), value: Aligned::of(6 * MOST), of: [[0; WORDS]; 6], len: 0 }
     }
 }
 
 /// A vector instruction set, known to be there.
-pub trait Lanes: Copy + Send + Sync {
+pub(super) trait Lanes: Copy + Send + Sync {
     /// Works one column of vertices compiled for this instruction set.
     fn column(self, column: &mut super::kernel::Column<'_, '_>);
 
@@ -111,7 +115,7 @@ pub trait Lanes: Copy + Send + Sync {
 
 /// Plain Rust, for any processor.
 #[derive(Debug, Clone, Copy)]
-pub struct Plain;
+pub(super) struct Plain;
 
 #[inline(always)]
 fn square(x: f32) -> f32 {
@@ -135,7 +139,7 @@ fn keep(all: &Points, kept: &mut Points, limit: f32, relative: [f32; 3], distanc
 
 /// [`Lanes::choose`], one by one.
 #[inline(always)]
-pub fn choose(from: &[u32], mut places: u64, to: &mut [u32]) -> usize {
+pub(super) fn choose(from: &[u32], mut places: u64, to: &mut [u32]) -> usize {
     let mut n = 0;
     while places != 0 {
         to[n] = from[places.trailing_zeros() as usize];
@@ -147,7 +151,7 @@ pub fn choose(from: &[u32], mut places: u64, to: &mut [u32]) -> usize {
 
 /// [`Lanes::fetch`], one by one.
 #[inline(always)]
-pub fn fetch(field: &NormalField, vertex: DVec3, near: &mut Near) {
+pub(super) fn fetch(field: &NormalField, vertex: DVec3, near: &mut Near) {
     let value: &mut [f64] = &mut near.value;
     let (x, value) = value.split_at_mut(MOST);
     let (y, value) = value.split_at_mut(MOST);
@@ -197,7 +201,7 @@ impl Lanes for Plain {
         keys.padded = n;
         for q in 0..6 {
             let ranks = &mut keys.rank[q * MOST..q * MOST + n];
-            let shift = if q % 2 == 0 { offset } else { -offset };
+            let shift = if q.is_multiple_of(2) { offset } else { -offset };
             let [a, b, c] = match q / 2 {
                 0 => [&points.x, &points.y, &points.z],
                 1 => [&points.y, &points.z, &points.x],
@@ -255,8 +259,8 @@ impl Lanes for Plain {
     fn sums(self, near: &Near, weighting: &Weighting) -> [Sum; 6] {
         let mut sums = [Sum::default(); 6];
         let value = |k: usize| &near.value[k * MOST..k * MOST + near.len];
-        for q in 0..6 {
-            let side = if q % 2 == 0 { weighting.offset_m } else { -weighting.offset_m };
+        for q in 0..6usize {
+            let side = if q.is_multiple_of(2) { weighting.offset_m } else { -weighting.offset_m };
             let axis = q / 2;
             let (a, b, c, n) = (value(axis), value((axis + 1) % 3), value((axis + 2) % 3), value(3 + axis));
             let (mut weighted, mut weights) = (0i64, 0i64);

@@ -27,7 +27,6 @@ mod thresholds;
 mod visits;
 mod weights;
 
-pub use kernel::TALLY;
 pub use instruction_set::InstructionSet;
 pub use neighbours::{Neighbour, Neighbours};
 

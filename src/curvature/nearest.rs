@@ -11,27 +11,27 @@ use crate::geometry::DVec3;
 use crate::tile::NormalField;
 
 /// Side of a cell in mean triangle sides.
-pub const CELL_SIDES: f64 = 3.5;
+pub(super) const CELL_SIDES: f64 = 3.5;
 /// Most candidates of a block.
 const BLOCK: usize = 1 << 15;
 
 /// Everything that all columns share.
-pub struct Job<'a> {
+pub(super) struct Job<'a> {
     /// The centroids.
-    pub grid: &'a Grid,
+    pub(super) grid: &'a Grid,
     /// The field they come from.
-    pub field: &'a NormalField,
+    pub(super) field: &'a NormalField,
     /// Where the distance is wanted.
-    pub points: &'a [DVec3],
+    pub(super) points: &'a [DVec3],
     /// Mean side of a triangle, metres.
-    pub side_m: f64,
+    pub(super) side_m: f64,
     /// The exact search, if needed.
-    pub reserve: &'a Reserve<'a>,
+    pub(super) reserve: &'a Reserve<'a>,
 }
 
 /// Buffers of a thread.
 #[derive(Default)]
-pub struct Workspace {
+pub(super) struct Workspace {
     queue: Vec<(i32, u32)>,
     block: Points,
     near: Points,
@@ -39,20 +39,20 @@ pub struct Workspace {
 }
 
 /// Vertices of one column.
-pub struct Column<'a, 'j> {
+pub(super) struct Column<'a, 'j> {
     /// What all columns share.
-    pub job: &'a Job<'j>,
+    pub(super) job: &'a Job<'j>,
     /// Numbers of the vertices.
-    pub vertices: &'a [u32],
+    pub(super) vertices: &'a [u32],
     /// Their distances, metres.
-    pub found: &'a mut [Option<f64>],
+    pub(super) found: &'a mut [Option<f64>],
     /// Buffers.
-    pub work: &'a mut Workspace,
+    pub(super) work: &'a mut Workspace,
 }
 
 /// Works a column.
 #[inline(always)]
-pub fn work<L: Lanes>(lanes: L, column: &mut Column<'_, '_>) {
+pub(super) fn work<L: Lanes>(lanes: L, column: &mut Column<'_, '_>) {
     let Column { job, vertices, found, work } = column;
     let point = |i: u32| job.points[vertices[i as usize] as usize];
     work.queue.clear();

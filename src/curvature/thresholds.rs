@@ -7,11 +7,12 @@
 //! Ranks are true to half a unit (the caller sees to it). So if no rank equals the threshold, everything below is
 //! nearer than everything above and the set is exact. Otherwise the threshold is the k-th lowest rank: lower ranks
 //! than its neighbours' are surely among the nearest, higher ones surely not, and [`undecided`] are the few between.
+#![allow(clippy::needless_range_loop, reason = "stencil points and axes run through several arrays at once")]
 
 use super::lanes::{Keys, Lanes, Set};
 
 /// Rank that stands for the distance up to which candidates are complete.
-pub const COMPLETE: f64 = 65_500.0;
+pub(super) const COMPLETE: f64 = 65_500.0;
 
 /// Highest threshold: those undecided at it are still complete.
 const HIGHEST: i32 = 65_498;
@@ -20,12 +21,12 @@ const HIGHEST: i32 = 65_498;
 const INTEGER: f32 = 12_582_912.0;
 
 /// Thresholds at the six stencil points; and two idle lanes, which make a vector full.
-pub type Thresholds = [i32; 8];
+pub(super) type Thresholds = [i32; 8];
 
 /// Finds, from a first guess, the least ranks that at least `k` candidates do not exceed, or any thresholds that
 /// exactly `k` do not exceed. False where there are too few within reach.
 #[inline(always)]
-pub fn search<L: Lanes>(lanes: L, keys: &Keys, k: i32, at: &mut Thresholds) -> bool {
+pub(super) fn search<L: Lanes>(lanes: L, keys: &Keys, k: i32, at: &mut Thresholds) -> bool {
     let wanted = k as f32;
     let mut low = [-1i32; 8];
     let mut high = [HIGHEST + 1; 8];
@@ -37,7 +38,7 @@ pub fn search<L: Lanes>(lanes: L, keys: &Keys, k: i32, at: &mut Thresholds) -> b
     for round in 1.. {
         let mut counts = lanes.count(keys, at);
         (counts[6], counts[7]) = (k, k);
-        let bisect = round % 4 == 0;
+        let bisect = u32::is_multiple_of(round, 4);
         let mut open = 0;
         let mut lacking = 0;
         for q in 0..8 {
@@ -73,7 +74,7 @@ pub fn search<L: Lanes>(lanes: L, keys: &Keys, k: i32, at: &mut Thresholds) -> b
 /// Candidates whose place at the threshold (the k-th lowest rank) ranks cannot tell; those surely nearer are put into
 /// `set`.
 #[cold]
-pub fn undecided(keys: &Keys, q: usize, threshold: i32, set: &mut Set) -> Vec<usize> {
+pub(super) fn undecided(keys: &Keys, q: usize, threshold: i32, set: &mut Set) -> Vec<usize> {
     let mut between = Vec::new();
     set.fill(0);
     for (i, &rank) in keys.at(q).iter().enumerate() {

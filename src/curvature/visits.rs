@@ -8,7 +8,7 @@ use rayon::prelude::*;
 const RUN: usize = 32;
 
 /// Points in the order of their columns, to be worked together.
-pub struct Visits {
+pub(super) struct Visits {
     /// Points, column by column.
     order: Vec<u32>,
     /// First point of each column.
@@ -17,7 +17,7 @@ pub struct Visits {
 
 impl Visits {
     /// Sorts points by the column of the grid they are in.
-    pub fn new(grid: &Grid, points: &[DVec3]) -> Visits {
+    pub(super) fn new(grid: &Grid, points: &[DVec3]) -> Visits {
         let columns = grid.columns();
         let mut start = vec![0u32; columns + 2];
         let place: Vec<u32> = points
@@ -43,7 +43,7 @@ impl Visits {
     }
 
     /// Values of all points, in their own order, from work on runs of columns in parallel.
-    pub fn by_column<S>(
+    pub(super) fn by_column<S>(
         &self,
         workspace: impl Fn() -> S + Sync + Send,
         work: impl Fn(&mut S, &[u32], &mut [Option<f64>]) + Sync + Send,
