@@ -9,21 +9,37 @@
 //! of `stencil_spacings` times the survey's mean vertex-to-centroid distance: one distance for the whole
 //! survey, as in the authors' program (the text has one for each triangle).
 //!
-//! Everything is summed in the order (distance², global triangle id) from coordinates that know no tile,
-//! so a value is the same bits in every tile that is certain of it.
+//! The neighbours are the nearest by (distance², global triangle id), from coordinates that know no tile, and
+//! they are summed exactly: a value is the same bits in every tile that is certain of it, on every processor.
 
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+mod buffer;
+mod grid;
+mod instruction_set;
+mod kernel;
+mod lanes;
+mod nearest;
 mod neighbours;
+mod thresholds;
+mod visits;
+mod weights;
 
+pub use instruction_set::InstructionSet;
 pub use neighbours::{Neighbour, Neighbours};
 
 use crate::geometry::DVec3;
 use crate::settings::CurvatureSettings;
 use crate::tile::NormalField;
+use grid::Grid;
+use instruction_set::Work;
+use lanes::Lanes;
+use neighbours::Reserve;
 use rayon::prelude::*;
-
-/// Columns of the search are this many mean triangle sides wide: narrow enough to gather few candidates
-/// in vain, wide enough to touch few columns (2 to 3 are alike; measured on synthetic beds).
-const COLUMN_SIDES: f64 = 2.5;
+use visits::Visits;
+use weights::Weighting;
 
 /// What the stencil needs to know about the whole survey.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,44 +85,86 @@ impl Stencil {
 /// Distance from each point to the nearest centroid of the field, metres; none where a centroid beyond
 /// what was loaded could be nearer.
 pub fn nearest_centroid_m(field: &NormalField, points: &[DVec3], side_m: f64) -> Vec<Option<f64>> {
-    let search = Neighbours::new(field, COLUMN_SIDES * side_m);
-    points
-        .par_iter()
-        .map_init(Vec::new, |found, &p| {
-            let certain = search.nearest(p, 1, side_m, found);
-            found.first().filter(|_| certain).map(|n| n.0.sqrt())
-        })
-        .collect()
+    nearest_centroid_m_with(field, points, side_m, InstructionSet::best())
+}
+
+/// [`nearest_centroid_m`] with a certain instruction set, which must be available.
+#[doc(hidden)]
+pub fn nearest_centroid_m_with(
+    field: &NormalField,
+    points: &[DVec3],
+    side_m: f64,
+    set: InstructionSet,
+) -> Vec<Option<f64>> {
+    let reserve = Reserve::new(field, side_m);
+    let Some(grid) = Grid::new(field, nearest::CELL_SIDES * side_m) else {
+        return points.par_iter().map(|&p| reserve.nearest_m(p, side_m)).collect();
+    };
+    let visits = Visits::new(&grid, points);
+    let job = nearest::Job { grid: &grid, field, points, side_m, reserve: &reserve };
+    set.run(NearestPass { job: &job, visits: &visits })
 }
 
 /// Divergence of the normal field at each point, 1/m, positive where convex; none where something beyond
 /// what was loaded could change it.
 pub fn divergence(field: &NormalField, points: &[DVec3], stencil: &Stencil) -> Vec<Option<f64>> {
-    let search = Neighbours::new(field, COLUMN_SIDES * stencil.side_m);
-    points
-        .par_iter()
-        .map_init(Vec::new, |found, &p| {
-            let mut sum = 0.0;
-            let mut certain = true;
-            for axis in 0..3 {
-                let shift = DVec3::AXES[axis] * stencil.offset_m;
-                for (place, sign) in [(p + shift, 1.0), (p - shift, -1.0)] {
-                    certain &= search.nearest(place, stencil.neighbours, stencil.first_radius_m(), found);
-                    sum += sign * weighted_normal(field, found, axis, stencil.spacing_m);
-                }
-            }
-            certain.then_some(sum / stencil.offset_m / 2.0)
-        })
-        .collect()
+    divergence_with(field, points, stencil, InstructionSet::best())
 }
 
-/// One component of the inverse-distance weighted normal.
-fn weighted_normal(field: &NormalField, found: &[Neighbour], axis: usize, least_m: f64) -> f64 {
-    let (mut weighted, mut weights) = (0.0, 0.0);
-    for &(d2, t) in found {
-        let w = 1.0 / d2.sqrt().max(least_m);
-        weighted += w * field.normals[t as usize][axis];
-        weights += w;
+/// [`divergence`] with a certain instruction set, which must be available.
+#[doc(hidden)]
+pub fn divergence_with(
+    field: &NormalField,
+    points: &[DVec3],
+    stencil: &Stencil,
+    set: InstructionSet,
+) -> Vec<Option<f64>> {
+    let weighting = Weighting::new(stencil.offset_m, stencil.spacing_m);
+    let reserve = Reserve::new(field, stencil.side_m);
+    let few = field.centroids.len() < 2 * stencil.neighbours || stencil.neighbours > MOST_NEIGHBOURS;
+    let side_m = CELL_REACHES * (stencil.typical_radius_m() + stencil.offset_m);
+    let Some(grid) = Some(side_m).filter(|_| !few).and_then(|side_m| Grid::new(field, side_m)) else {
+        return points.par_iter().map(|&p| reserve.divergence(p, stencil, &weighting)).collect();
+    };
+    let visits = Visits::new(&grid, points);
+    let job = kernel::Job { grid: &grid, field, points, stencil, weighting, reserve: &reserve };
+    set.run(DivergencePass { job: &job, visits: &visits })
+}
+
+/// Sums of more neighbours could overflow.
+const MOST_NEIGHBOURS: usize = 256;
+
+/// Side of a cell in multiples of how far a vertex usually looks: its neighbours must be in adjoining cells, also
+/// at the edge of the survey, where they are on one side only.
+const CELL_REACHES: f64 = 1.53;
+
+struct DivergencePass<'a> {
+    job: &'a kernel::Job<'a>,
+    visits: &'a Visits,
+}
+
+impl Work for DivergencePass<'_> {
+    type Result = Vec<Option<f64>>;
+
+    fn with<L: Lanes>(self, lanes: L) -> Self::Result {
+        self.visits.by_column(
+            || kernel::Workspace::new(self.job.stencil),
+            |work, vertices, found| lanes.column(&mut kernel::Column { job: self.job, vertices, found, work }),
+        )
     }
-    weighted / weights
+}
+
+struct NearestPass<'a> {
+    job: &'a nearest::Job<'a>,
+    visits: &'a Visits,
+}
+
+impl Work for NearestPass<'_> {
+    type Result = Vec<Option<f64>>;
+
+    fn with<L: Lanes>(self, lanes: L) -> Self::Result {
+        self.visits.by_column(nearest::Workspace::default, |work, vertices, found| {
+            lanes.nearest_column(&mut nearest::Column { job: self.job, vertices, found, work });
+        })
+    }
 }

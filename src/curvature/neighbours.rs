@@ -3,8 +3,16 @@
 //! A river bed is a sheet: centroids are sorted into square columns in plan, and by height within each.
 //! A search gathers a ball, grows it until it holds enough, and keeps the nearest.
 
+use super::Stencil;
+use super::kernel::{stencil_point, sum_of};
+use super::weights::{Weighting, divergence_of};
 use crate::geometry::{DVec3, PlanBox};
 use crate::tile::NormalField;
+use std::sync::OnceLock;
+
+/// Columns of the search are this many mean triangle sides wide: narrow enough to gather few candidates
+/// in vain, wide enough to touch few columns (2 to 3 are alike; measured on synthetic beds).
+const COLUMN_SIDES: f64 = 2.5;
 
 /// Columns of triangle centroids, ready to be searched.
 pub struct Neighbours<'a> {
@@ -20,6 +28,49 @@ pub struct Neighbours<'a> {
 
 /// A neighbour: squared distance (m²) and local triangle number. Ordered by both, in this order.
 pub type Neighbour = (f64, u32);
+
+/// Squared distance as the order of neighbours has it, m².
+#[inline(always)]
+pub(super) fn distance2(centroid: DVec3, p: DVec3) -> f64 {
+    let d = centroid - p;
+    d.x * d.x + d.y * d.y + d.z * d.z
+}
+
+/// The exact search, made when it is first needed: the kernel seldom does.
+pub(super) struct Reserve<'a> {
+    field: &'a NormalField,
+    column_m: f64,
+    search: OnceLock<Neighbours<'a>>,
+}
+
+impl<'a> Reserve<'a> {
+    pub(super) fn new(field: &'a NormalField, side_m: f64) -> Self {
+        Reserve { field, column_m: COLUMN_SIDES * side_m, search: OnceLock::new() }
+    }
+
+    fn search(&self) -> &Neighbours<'a> {
+        self.search.get_or_init(|| Neighbours::new(self.field, self.column_m))
+    }
+
+    /// The divergence at a point, 1/m; none where uncertain.
+    pub(super) fn divergence(&self, p: DVec3, stencil: &Stencil, weighting: &Weighting) -> Option<f64> {
+        let mut found = Vec::new();
+        let mut certain = true;
+        let sums = [0, 1, 2, 3, 4, 5].map(|q| {
+            let place = stencil_point(p, q, stencil.offset_m);
+            certain &= self.search().nearest(place, stencil.neighbours, stencil.first_radius_m(), &mut found);
+            sum_of(self.field, &found, p, q, weighting)
+        });
+        certain.then(|| divergence_of(&sums, stencil.offset_m))
+    }
+
+    /// Distance to the nearest centroid, metres; none where uncertain.
+    pub(super) fn nearest_m(&self, p: DVec3, guess_m: f64) -> Option<f64> {
+        let mut found = Vec::new();
+        let certain = self.search().nearest(p, 1, guess_m, &mut found);
+        found.first().filter(|_| certain).map(|n| n.0.sqrt())
+    }
+}
 
 impl<'a> Neighbours<'a> {
     /// Sorts a field into columns of `column_m` metres.
@@ -115,8 +166,7 @@ impl<'a> Neighbours<'a> {
                     if z > high {
                         break;
                     }
-                    let d = self.field.centroids[t as usize] - p;
-                    let d2 = d.x * d.x + d.y * d.y + d.z * d.z;
+                    let d2 = distance2(self.field.centroids[t as usize], p);
                     if d2 <= limit {
                         found.push((d2, t));
                     }
