@@ -137,7 +137,7 @@ fn weight(d2: f64, spacing_m: f64) -> f64 {
 /// The divergence by sorting all centroids; none where one beyond what is loaded could count.
 fn reference(field: &NormalField, p: DVec3, s: &Stencil) -> Option<f64> {
     let mut means = [0.0; 6];
-    for q in 0..6 {
+    for (q, mean) in means.iter_mut().enumerate() {
         let shift = DVec3::AXES[q / 2] * s.offset_m;
         let place = if q.is_multiple_of(2) { p + shift } else { p - shift };
         let mut all: Vec<(f64, usize)> = field
@@ -163,7 +163,7 @@ fn reference(field: &NormalField, p: DVec3, s: &Stencil) -> Option<f64> {
             weights += w.round_ties_even() as i64;
             weighted += (w * field.normals[t][axis]).round_ties_even() as i64;
         }
-        means[q] = weighted as f64 / weights as f64;
+        *mean = weighted as f64 / weights as f64;
     }
     Some(((means[0] - means[1]) + (means[2] - means[3]) + (means[4] - means[5])) / (2.0 * s.offset_m))
 }

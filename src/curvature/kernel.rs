@@ -13,6 +13,7 @@
 #![allow(clippy::needless_range_loop, reason = "stencil points and axes run through several arrays at once")]
 
 use super::Stencil;
+use super::block::Block;
 use super::buffer::Points;
 use super::grid::Grid;
 use super::lanes::{Keys, Lanes, MOST, Near, Set, WORDS};
@@ -100,16 +101,6 @@ enum Outcome {
     Hopeless,
 }
 
-/// A block of candidates, and the part of it that a group of vertices needs.
-struct Block {
-    slot: [i32; 3],
-    rings: i32,
-    centre: DVec3,
-    group_centre: [f32; 3],
-    group_half: [f32; 3],
-    group_radius_m: f64,
-}
-
 /// Works a column.
 #[inline(always)]
 pub(super) fn work<L: Lanes>(lanes: L, column: &mut Column<'_, '_>) {
@@ -161,14 +152,7 @@ fn cell<L: Lanes>(lanes: L, column: &mut Column<'_, '_>, queue: &[(u32, u32)]) {
             later.extend_from_slice(queue);
             break;
         }
-        let mut block = Block {
-            slot,
-            rings,
-            centre: job.grid.centre(slot),
-            group_centre: [0.0; 3],
-            group_half: [0.0; 3],
-            group_radius_m: 0.0,
-        };
+        let mut block = Block::around(job.grid, slot, rings);
         let mut rest = queue;
         while !rest.is_empty() {
             let group = &rest[..group_len(rest)];
@@ -206,30 +190,6 @@ fn group_len(queue: &[(u32, u32)]) -> usize {
     i
 }
 
-impl Block {
-    #[inline(always)]
-    fn start_group(&mut self, points: impl Iterator<Item = DVec3>) {
-        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for p in points {
-            let at = p - self.centre;
-            (low, high) = (low.min(at), high.max(at));
-        }
-        self.group_centre = ((low + high) * 0.5).as_vec3().to_array();
-        self.group_half = ((high - low) * 0.500_01).as_vec3().to_array();
-        self.group_radius_m = 0.0;
-    }
-
-    /// Narrows the block to what a ball of this radius around any vertex of the group can hold.
-    #[inline(always)]
-    fn narrow<L: Lanes>(&mut self, lanes: L, work: &mut Workspace, radius_m: f64) {
-        self.group_radius_m = radius_m;
-        let limit = (radius_m * 1.000_01) as f32;
-        lanes.keep_near_box(&work.block, self.group_centre, self.group_half, limit * limit, &mut work.group);
-        let n = work.group.len;
-        work.group.pad(n + 64);
-    }
-}
-
 /// Works one vertex.
 #[inline(always)]
 fn vertex<L: Lanes>(lanes: L, job: &Job<'_>, work: &mut Workspace, block: &mut Block, p: DVec3) -> Outcome {
@@ -241,7 +201,7 @@ fn vertex<L: Lanes>(lanes: L, job: &Job<'_>, work: &mut Workspace, block: &mut B
     let mut thresholds: Thresholds = [0; 8];
     let per_m2 = loop {
         if radius_m > block.group_radius_m {
-            block.narrow(lanes, work, 1.06 * radius_m);
+            block.narrow(lanes, &work.block, &mut work.group, 1.06 * radius_m);
         }
         lanes.keep_ball(&work.group, at.as_vec3().to_array(), (radius_m * radius_m) as f32, &mut work.ball);
         let n = work.ball.len;
