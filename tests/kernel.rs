@@ -1,9 +1,11 @@
 //! The curvature kernel against a plain search that sorts everything, bit for bit, on clouds that are nasty on
 //! purpose, with every instruction set that this processor has.
-#![allow(missing_docs, clippy::unwrap_used)]
+#![allow(missing_docs, clippy::unwrap_used, clippy::needless_range_loop, unreachable_pub)]
+
+mod support;
 
 use gravelometer::curvature::{InstructionSet, Neighbours, Stencil, divergence_with, nearest_centroid_m_with};
-use gravelometer::geometry::{DVec3, PlanBox};
+use gravelometer::geometry::{DVec3, PlanBox, triangle_area, triangle_centroid, triangle_normal};
 use gravelometer::tile::NormalField;
 
 const EVERYWHERE: PlanBox = PlanBox { min: [f64::NEG_INFINITY; 2], max: [f64::INFINITY; 2] };
@@ -134,10 +136,25 @@ fn weight(d2: f64, spacing_m: f64) -> f64 {
     y + y * e * (0.5 + e * (0.375 + e * (0.3125 + e * 0.273_437_5)))
 }
 
+/// The weighted mean of one component of the neighbours' normals.
+fn mean(field: &NormalField, found: impl Iterator<Item = usize>, p: DVec3, s: &Stencil, q: usize) -> f64 {
+    let (mut weighted, mut weights) = (0i64, 0i64);
+    let axis = q / 2;
+    for t in found {
+        let u = field.centroids[t] - p;
+        let a = if q.is_multiple_of(2) { u[axis] - s.offset_m } else { u[axis] + s.offset_m };
+        let (b, c) = (u[(axis + 1) % 3], u[(axis + 2) % 3]);
+        let w = weight(a * a + (b * b + c * c), s.spacing_m);
+        weights += w.round_ties_even() as i64;
+        weighted += (w * field.normals[t][axis]).round_ties_even() as i64;
+    }
+    weighted as f64 / weights as f64
+}
+
 /// The divergence by sorting all centroids; none where one beyond what is loaded could count.
 fn reference(field: &NormalField, p: DVec3, s: &Stencil) -> Option<f64> {
     let mut means = [0.0; 6];
-    for (q, mean) in means.iter_mut().enumerate() {
+    for (q, of_point) in means.iter_mut().enumerate() {
         let shift = DVec3::AXES[q / 2] * s.offset_m;
         let place = if q.is_multiple_of(2) { p + shift } else { p - shift };
         let mut all: Vec<(f64, usize)> = field
@@ -153,17 +170,7 @@ fn reference(field: &NormalField, p: DVec3, s: &Stencil) -> Option<f64> {
         if margin < f64::INFINITY && (all.len() < s.neighbours || all[all.len() - 1].0.sqrt() >= margin) {
             return None;
         }
-        let (mut weighted, mut weights) = (0i64, 0i64);
-        for (_, t) in all {
-            let u = field.centroids[t] - p;
-            let axis = q / 2;
-            let a = if q.is_multiple_of(2) { u[axis] - s.offset_m } else { u[axis] + s.offset_m };
-            let (b, c) = (u[(axis + 1) % 3], u[(axis + 2) % 3]);
-            let w = weight(a * a + (b * b + c * c), s.spacing_m);
-            weights += w.round_ties_even() as i64;
-            weighted += (w * field.normals[t][axis]).round_ties_even() as i64;
-        }
-        *mean = weighted as f64 / weights as f64;
+        *of_point = mean(field, all.iter().map(|n| n.1), p, s, q);
     }
     Some(((means[0] - means[1]) + (means[2] - means[3]) + (means[4] - means[5])) / (2.0 * s.offset_m))
 }
@@ -182,6 +189,66 @@ fn every_instruction_set_gives_the_bits_of_a_plain_search() {
             for set in InstructionSet::available() {
                 let found = divergence_with(&cloud.field, &cloud.points, &stencil, set);
                 assert_eq!(bits(&found), bits(&expected), "{}, {k} neighbours, {set:?}", cloud.name);
+            }
+        }
+    }
+}
+
+/// A golden mesh: float x y z, uchar colours, triangles as `list uchar int`.
+fn golden(name: &str) -> Option<Cloud> {
+    let bytes = std::fs::read(support::data(&format!("golden/{name}.ply"))?).unwrap();
+    let end = bytes.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
+    let header = std::str::from_utf8(&bytes[..end]).unwrap();
+    let count = |name: &str| -> usize {
+        header.lines().find_map(|l| l.strip_prefix(&format!("element {name} "))).unwrap().parse().unwrap()
+    };
+    let (n, m) = (count("vertex"), count("face"));
+    let float = |at: usize| f64::from(f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()));
+    let int = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+    let points: Vec<DVec3> =
+        (0..n).map(|i| end + 15 * i).map(|at| DVec3::new(float(at), float(at + 4), float(at + 8))).collect();
+    let corners: Vec<[DVec3; 3]> =
+        (0..m).map(|i| end + 15 * n + 13 * i).map(|at| [1, 5, 9].map(|k| points[int(at + k)])).collect();
+    let area = corners.iter().map(|&c| triangle_area(c)).sum::<f64>() / m as f64;
+    let field = NormalField {
+        centroids: corners.iter().map(|&c| triangle_centroid(c)).collect(),
+        normals: corners.iter().map(|&c| triangle_normal(c)).collect(),
+        loaded: EVERYWHERE,
+    };
+    Some(Cloud { name: "golden", field, points, side_m: area.sqrt() })
+}
+
+#[test]
+fn golden_beds_have_the_bits_of_the_exact_search_on_one_thread_and_two() {
+    for name in ["bed_0.3M", "bed3d_1M"] {
+        let Some(mut bed) = golden(name) else { return };
+        let stencil = bed.stencil(25);
+        let whole = divergence_with(&bed.field, &bed.points, &stencil, InstructionSet::best());
+        let every = |i: usize| i * 23;
+        bed.points = (0..bed.points.len().div_ceil(23)).map(|i| bed.points[every(i)]).collect();
+        let search = Neighbours::new(&bed.field, 2.5 * bed.side_m);
+        let mut found = Vec::new();
+        let expected: Vec<_> = bed
+            .points
+            .iter()
+            .map(|&p| {
+                let means = [0, 1, 2, 3, 4, 5].map(|q| {
+                    let shift = DVec3::AXES[q / 2] * stencil.offset_m;
+                    let place = if q.is_multiple_of(2) { p + shift } else { p - shift };
+                    assert!(search.nearest(place, 25, 3.5 * bed.side_m, &mut found));
+                    mean(&bed.field, found.iter().map(|n| n.1 as usize), p, &stencil, q)
+                });
+                let [x, y, z] = [0, 2, 4].map(|q| means[q] - means[q + 1]);
+                Some((x + y + z) / (2.0 * stencil.offset_m))
+            })
+            .collect();
+        let thinned: Vec<_> = (0..expected.len()).map(|i| whole[every(i)]).collect();
+        assert_eq!(bits(&thinned), bits(&expected), "{name}");
+        for set in InstructionSet::available() {
+            for threads in [1, 2] {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                let found = pool.install(|| divergence_with(&bed.field, &bed.points, &stencil, set));
+                assert_eq!(bits(&found), bits(&expected), "{name}, {set:?}, {threads} threads");
             }
         }
     }

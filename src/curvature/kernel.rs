@@ -149,7 +149,8 @@ fn cell<L: Lanes>(lanes: L, column: &mut Column<'_, '_>, queue: &[(u32, u32)]) {
     for (turn, rings) in RINGS.into_iter().enumerate() {
         let queue = if turn == 0 { queue } else { &now[..] };
         if !job.grid.gather(slot, rings, BLOCK, &mut column.work.block) {
-            later.extend_from_slice(queue);
+            later = queue.to_vec();
+            now.clear();
             break;
         }
         let mut block = Block::around(job.grid, slot, rings);
@@ -161,9 +162,7 @@ fn cell<L: Lanes>(lanes: L, column: &mut Column<'_, '_>, queue: &[(u32, u32)]) {
                 match vertex(lanes, job, column.work, &mut block, point(e)) {
                     Outcome::Known(value) => column.found[e.1 as usize] = value,
                     Outcome::Further => later.push(*e),
-                    Outcome::Hopeless => {
-                        column.found[e.1 as usize] = job.searched(point(e));
-                    }
+                    Outcome::Hopeless => column.found[e.1 as usize] = job.searched(point(e)),
                 }
             }
             rest = &rest[group.len()..];
