@@ -38,7 +38,7 @@ pub struct Scene {
     pub colors: Vec<[u8; 3]>,
     /// Vertex ids, counter-clockwise from outside.
     pub triangles: Vec<[u32; 3]>,
-    /// The stone of each triangle, or [`SAND`].
+    /// The stone of each triangle, or [`super::SAND`].
     pub stone_of_triangle: Vec<u32>,
     /// All stones, hidden ones too.
     pub stones: Vec<Stone>,
