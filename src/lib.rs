@@ -38,6 +38,7 @@ pub mod write;
 pub mod pipeline;
 
 pub mod cli;
+pub mod costs;
 pub mod demo;
 pub mod error;
 pub mod inspect;

@@ -1,7 +1,8 @@
 //! The program: parse, run, say what went wrong, exit.
 
 use clap::Parser;
-use gravelometer::cli::{Cli, Command, DemoArgs, InspectArgs, Log, RunArgs, SettingArgs, report_error, reporter};
+use gravelometer::cli::{Cli, Command, DemoArgs, InspectArgs, Log, RunArgs, SettingArgs};
+use gravelometer::cli::{cost_table, report_error, reporter};
 use gravelometer::demo::{Demonstration, demonstrate};
 use gravelometer::error::{Error, ExitCode};
 use gravelometer::pipeline::Control;
@@ -48,6 +49,9 @@ fn run_command(args: &RunArgs) -> Result<ExitCode, Error> {
     let job = Job { inputs: args.inputs.clone(), out: args.out.clone(), settings, force: args.force };
     let progress = reporter(args.log);
     let outcome = run(&job, &*progress, &control(&*progress, args.log))?;
+    if args.log == Log::Text {
+        progress.note(&cost_table(&outcome.costs, outcome.triangles));
+    }
     progress.note(&format!(
         "{} grains and {} oversize bodies in {}; {:.2} triangles segmented for each of the survey",
         outcome.catalogue.grains.len(),

@@ -1,8 +1,11 @@
 //! What a long run says while it works. The library speaks to this trait; the command line draws bars,
 //! plain lines or JSON.
 
+use serde::Serialize;
+
 /// What a stage counts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Unit {
     /// Bytes of input.
     Bytes,

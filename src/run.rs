@@ -1,5 +1,6 @@
 //! The page that shows the river: from files to files.
 
+use crate::costs::{Costs, Meter};
 use crate::curvature::Stencil;
 use crate::error::Error;
 use crate::index::Index;
@@ -41,6 +42,10 @@ pub struct Outcome {
     pub lost: Vec<LostJob>,
     /// Triangles segmented for each triangle of the survey: what halos cost.
     pub segmented_per_triangle: f64,
+    /// Triangles of the survey.
+    pub triangles: u64,
+    /// What each stage cost.
+    pub costs: Costs,
 }
 
 /// Runs a job: opens the survey, works it tile by tile, and writes the results.
@@ -51,6 +56,8 @@ pub struct Outcome {
 /// # Errors
 /// Whatever keeps the results from being complete; see [`Error`].
 pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outcome, Error> {
+    let meter = Meter::new(progress);
+    let progress: &dyn Progress = &meter;
     let settings = &job.settings;
     settings.check()?;
     let folder = OutputFolder::create(&job.out, job.force, &[])?;
@@ -99,7 +106,9 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let (catalogue, tiles) = stitch(found.result, touch_steps);
 
     // statistics and write
-    let facts = facts(&reach, &index, &plan, &warnings, &found.lost);
+    let mut facts = facts(&reach, &index, &plan, &warnings, &found.lost);
+    let segmented_per_triangle = segmented_per_triangle(&tiles);
+    facts["segmented_per_triangle"] = segmented_per_triangle.into();
     let mesh = WholeMesh::new(&reach);
     let surveyed = index.triangles.occupied(&index.grid);
     let results = Results {
@@ -111,10 +120,12 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
         tiles: &tiles,
         smallest_grain_area_m2: smallest_grain_area_m2(&index.scale, &settings.segment),
         facts: &facts,
+        costs: &|| serde_json::json!(meter.costs()),
         mesh: settings.output.labelled_mesh.then_some(&mesh),
     };
     let files = write(&folder, &results, progress)?;
-    Ok(Outcome { files, catalogue, lost: found.lost, segmented_per_triangle: segmented_per_triangle(&tiles) })
+    let (lost, triangles, costs) = (found.lost, reach.triangles(), meter.costs());
+    Ok(Outcome { files, catalogue, lost, segmented_per_triangle, triangles, costs })
 }
 
 /// Outlines within this many mean edges touch: grains are separated by a valley of a few triangles.

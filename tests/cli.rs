@@ -311,6 +311,43 @@ fn json_lines_are_json_and_tell_every_stage_from_begin_to_end() {
 }
 
 #[test]
+fn every_stage_and_its_cost_are_in_the_table_and_in_run_json() {
+    let (folder, mesh) = scene();
+    let out = folder.path().join("out");
+    let said = run(&mesh, &out, &[]);
+    assert_eq!(said.code, 0, "{}", said.err);
+    let surface = bed(21, 60, 50);
+    let triangles = surface.triangles.len() as u64;
+    let in_use: std::collections::BTreeSet<u64> = surface.triangles.iter().flatten().copied().collect();
+    let report: serde_json::Value = serde_json::from_slice(&std::fs::read(out.join("run.json")).unwrap()).unwrap();
+    let expected = [
+        ("open", std::fs::metadata(&mesh).unwrap().len(), "bytes"),
+        ("index", triangles, "triangles"),
+        ("spacing", in_use.len() as u64, "vertices"),
+        ("curvature", in_use.len() as u64, "vertices"),
+        ("grains", triangles, "triangles"),
+        ("write", 5, "files"),
+    ];
+    let stages = report["stages"].as_array().unwrap();
+    assert_eq!(stages.len(), expected.len(), "{stages:?}");
+    let mut wall_s = 0.0;
+    for (stage, (name, amount, unit)) in stages.iter().zip(expected) {
+        assert_eq!((&stage["name"], &stage["amount"], &stage["unit"]), (&name.into(), &amount.into(), &unit.into()));
+        wall_s += stage["wall_s"].as_f64().unwrap();
+        let row = said.err.lines().find(|l| l.starts_with(&format!("{name} "))).unwrap_or_else(|| panic!("{name}"));
+        assert!(row.contains(&format!(" {amount} {unit} ")), "{row}");
+    }
+    assert!(wall_s > 0.0 && wall_s <= report["wall_s"].as_f64().unwrap() + 1e-5, "{report}");
+    assert!(said.err.contains(&format!(" {triangles} triangles ")) && said.err.contains("peak memory"), "{}", said.err);
+    assert!(report["facts"]["segmented_per_triangle"].as_f64().unwrap() >= 1.0);
+    if cfg!(target_os = "linux") {
+        let cpu_s = |value: &serde_json::Value| value["cpu_s"].as_f64().unwrap();
+        assert!(stages.iter().map(cpu_s).sum::<f64>() <= cpu_s(&report) + 1e-5, "{report}");
+        assert!(report["peak_memory_bytes"].as_u64().unwrap() > 1 << 20, "{report}");
+    }
+}
+
+#[test]
 fn inspect_tells_people_and_programs_the_same() {
     let (_folder, mesh) = scene();
     let plain = gravelometer(["inspect".as_ref(), mesh.as_os_str()]);

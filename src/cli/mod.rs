@@ -1,7 +1,9 @@
 //! The command line: what the user typed becomes a job, what the job says becomes bars, lines or JSON.
 
+mod cost_table;
 mod report;
 
+pub use cost_table::cost_table;
 pub use report::{report_error, reporter};
 
 use crate::settings::{Settings, SettingsError, Unit};
@@ -29,7 +31,7 @@ What is written to OUT:
   grains.csv         one row for each grain, units in the column names
   grain_size.tif     D16, D50, D84, D90, mean b axis, count, cover (Cloud-Optimised GeoTIFF)
   summary.json       counts and percentiles of the whole survey
-  run.json           version, settings, inputs, warnings, lost tiles
+  run.json           version, settings, inputs, warnings, lost tiles, CPU time of each stage, peak memory
   labelled_mesh.ply  with --labelled-mesh: the input with a grain_id for each face
 
 The result does not depend on --tile-size, --threads and --memory.";

@@ -14,7 +14,7 @@ mod machine;
 
 pub use budget::{Budget, Reservation};
 pub use control::{Control, Interrupted};
-pub use machine::memory_there_bytes;
+pub use machine::{cpu_seconds, memory_there_bytes, peak_memory_bytes};
 
 use crossbeam_channel::{Receiver, Sender, bounded};
 use std::collections::BTreeMap;

@@ -14,9 +14,11 @@ pub(crate) fn write_summary(file: &Pending, summary: &Summary) -> Result<(), Wri
 }
 
 /// What was run: program, version, settings, frame, columns, and the facts that the run hands over.
+///
+/// The costs are those known before this file is written, the last: of the stage `write` all but its end.
 pub(crate) fn write_run(file: &Pending, results: &Results, names: &[&str]) -> Result<(), WriteError> {
     let frame = results.frame;
-    let report = json!({
+    let mut report = json!({
         "program": env!("CARGO_PKG_NAME"),
         "version": env!("CARGO_PKG_VERSION"),
         "settings": results.settings,
@@ -31,6 +33,9 @@ pub(crate) fn write_run(file: &Pending, results: &Results, names: &[&str]) -> Re
         "outputs": names,
         "grain_columns": COLUMNS,
     });
+    if let (Some(report), serde_json::Value::Object(costs)) = (report.as_object_mut(), (results.costs)()) {
+        report.extend(costs);
+    }
     write(file, &report)
 }
 

@@ -7,7 +7,7 @@
 //! | `grain_size.tif` | Cloud-Optimised GeoTIFF of grain sizes, count and cover |
 //! | `labelled_mesh.ply` | on request: the input mesh with a `grain_id` per face and vertex |
 //! | `summary.json` | counts, areas and percentiles |
-//! | `run.json` | program, version, settings, what came in and what was refused |
+//! | `run.json` | program, version, settings, what came in, what was refused, what each stage cost |
 
 mod atomic;
 pub mod columns;
@@ -55,6 +55,8 @@ pub struct Results<'a> {
     pub smallest_grain_area_m2: f64,
     /// What else belongs into `run.json`: input files, what was refused or lost.
     pub facts: &'a serde_json::Value,
+    /// What the run has cost so far, for `run.json`: an object, asked for when that file is written.
+    pub costs: &'a dyn Fn() -> serde_json::Value,
     /// The input mesh, if it is to be written again with labels.
     pub mesh: Option<&'a dyn MeshSource>,
 }

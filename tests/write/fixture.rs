@@ -33,6 +33,7 @@ impl Survey {
             tiles: &self.tiles,
             smallest_grain_area_m2: 1e-4,
             facts: &self.facts,
+            costs: &|| serde_json::json!({ "stages": [] }),
             mesh,
         }
     }
