@@ -14,6 +14,7 @@
 pub mod geometry;
 pub mod progress;
 pub mod settings;
+pub mod store;
 
 // The river. Blank lines keep the order.
 pub mod open;

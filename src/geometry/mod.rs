@@ -49,9 +49,11 @@ pub fn triangle_area(corners: [DVec3; 3]) -> f64 {
     0.5 * (corners[1] - corners[0]).cross(corners[2] - corners[0]).length()
 }
 
-/// Centroid of a triangle. The order of the additions is fixed, so that every tile gets the same bits.
+/// Centroid of a triangle. The order of the additions is fixed, so that every tile gets the same bits; it never
+/// lies outside the corners' box, as rounding could put it.
 pub fn triangle_centroid(corners: [DVec3; 3]) -> DVec3 {
-    ((corners[0] + corners[1]) + corners[2]) / 3.0
+    let [a, b, c] = corners;
+    (((a + b) + c) / 3.0).max(a.min(b).min(c)).min(a.max(b).max(c))
 }
 
 /// Unit normal of a triangle by the right-hand rule; zero for a triangle of no area.
