@@ -6,6 +6,7 @@ use super::edges::Edges;
 use super::state::{Labels, NONE, OVERSIZE, State};
 use crate::geometry::{ExactSum, PlanBox};
 use crate::tile::TileMesh;
+use serde::{Deserialize, Serialize};
 
 /// What a tile found.
 #[derive(Debug, Clone, Default)]
@@ -29,7 +30,7 @@ pub struct Segment {
 }
 
 /// The part of an oversize body that lies in a tile's core.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct OversizePiece {
     /// Lowest global triangle id in the core.
     pub anchor: u64,
