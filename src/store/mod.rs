@@ -10,6 +10,9 @@ mod element;
 mod error;
 mod fail_point;
 mod ledger;
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod ledger_damage;
 mod ledger_format;
 mod positioned;
 
