@@ -86,21 +86,32 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     ));
 
     // tile by tile: spacing, curvature, then segment and measure
-    let (spacing_m, lost) = Survey { index: &index, plan: &plans.curvature }.spacing(&crew, progress).map_err(|_| Interrupted)?;
+    let (spacing_m, lost) =
+        Survey { index: &index, plan: &plans.curvature }.spacing(&crew, progress).map_err(|_| Interrupted)?;
     none_lost("spacing", lost)?;
     index.scale.spacing_m = spacing_m;
     let stencil = Stencil::new(index.scale.spacing_m, index.scale.mean_triangle_area_m2, &settings.curvature);
     let divergence = shelf.create("divergence", index.scale.vertices)?;
     let survey = Survey { index: &index, plan: &plans.curvature };
     let jobs: Vec<usize> = (0..plans.curvature.tiles.len()).collect();
-    none_lost("curvature", survey.divergence(&crew, &jobs, &stencil, &divergence, progress, |_, _| Ok::<_, ()>(())).map_err(|_| Interrupted)?)?;
+    none_lost(
+        "curvature",
+        survey
+            .divergence(&crew, &jobs, &stencil, &divergence, progress, |_, _| Ok::<_, ()>(()))
+            .map_err(|_| Interrupted)?,
+    )?;
     let outline_step_m = reach.frame().outline_step_m();
     let wanted = Wanted { outline_step_m, triangle_ids: settings.output.labelled_mesh };
     let recipe = Recipe { settings: &settings.segment, divergence: &divergence, wanted };
     let survey = Survey { index: &index, plan };
     let jobs: Vec<usize> = (0..plan.tiles.len()).collect();
     let mut findings = Vec::new();
-    let found_lost = survey.grains(&crew, &jobs, &recipe, progress, |_, finding| { findings.push(finding); Ok::<_, ()>(()) }).map_err(|_| Interrupted)?;
+    let found_lost = survey
+        .grains(&crew, &jobs, &recipe, progress, |_, finding| {
+            findings.push(finding);
+            Ok::<_, ()>(())
+        })
+        .map_err(|_| Interrupted)?;
     let tile = |lost: &LostJob| plan.tiles[lost.job].id;
     found_lost.iter().for_each(|lost| progress.warn(&format!("tile {} is lost: {}", tile(lost), lost.message)));
 

@@ -74,7 +74,8 @@ pub(super) fn scatter<I: Id>(
 ) -> Result<Scatter<[I; 4]>, StoreError> {
     let scatter = Scatter::<[I; 4]>::new(shelf, "triangles", shards.len())?;
     let blocks = surface.vertices().div_ceil(block_vertices).max(1);
-    let passing = if blocks > 1 { Some(shelf.create::<[u64; 3]>("corners.scratch", surface.triangles())?) } else { None };
+    let passing =
+        if blocks > 1 { Some(shelf.create::<[u64; 3]>("corners.scratch", surface.triangles())?) } else { None };
     for k in 0..blocks {
         let input = k * block_vertices..((k + 1) * block_vertices).min(surface.vertices());
         let block = Block::read(inputs, input)?;
@@ -88,14 +89,19 @@ pub(super) fn scatter<I: Id>(
         };
         match &passing {
             Some(column) if k + 1 < blocks => {
-                over_chunks(surface, surface.triangles(), || Ok(()), |(), range| {
-                    let (first, mut known) = (range.start, Vec::new());
-                    corners(range, &mut |_, corners| {
-                        known.push(corners);
-                        Ok(())
-                    })?;
-                    column.write(first, known)
-                })?;
+                over_chunks(
+                    surface,
+                    surface.triangles(),
+                    || Ok(()),
+                    |(), range| {
+                        let (first, mut known) = (range.start, Vec::new());
+                        corners(range, &mut |_, corners| {
+                            known.push(corners);
+                            Ok(())
+                        })?;
+                        column.write(first, known)
+                    },
+                )?;
             }
             _ => over_chunks_then(
                 surface,

@@ -61,10 +61,15 @@ impl Bits {
 /// Looks at the survey in a few sequential passes.
 pub(super) fn look(surface: &dyn Surface) -> Result<Ground, StoreError> {
     let used = Bits::new(surface.vertices());
-    over_chunks(surface, surface.triangles(), || Ok(()), |(), range| {
-        range.for_each(|t| surface.triangle(t).into_iter().for_each(|v| used.set(v)));
-        Ok(())
-    })?;
+    over_chunks(
+        surface,
+        surface.triangles(),
+        || Ok(()),
+        |(), range| {
+            range.for_each(|t| surface.triangle(t).into_iter().for_each(|v| used.set(v)));
+            Ok(())
+        },
+    )?;
     let vertices = used.count();
     let (min, max) = bounds(surface, &used)?;
     let area_m2 = area_in_plan(surface, &used, vertices, (min, max))?;
@@ -79,23 +84,33 @@ pub(super) fn look(surface: &dyn Surface) -> Result<Ground, StoreError> {
 }
 
 fn each_used(surface: &dyn Surface, used: &Bits, look: impl Fn(DVec3) + Sync) -> Result<(), StoreError> {
-    over_chunks(surface, surface.vertices(), || Ok(()), |(), range| {
-        range.filter(|&v| used.get(v)).for_each(|v| look(surface.position(v)));
-        Ok(())
-    })
+    over_chunks(
+        surface,
+        surface.vertices(),
+        || Ok(()),
+        |(), range| {
+            range.filter(|&v| used.get(v)).for_each(|v| look(surface.position(v)));
+            Ok(())
+        },
+    )
 }
 
 fn bounds(surface: &dyn Surface, used: &Bits) -> Result<(DVec3, DVec3), StoreError> {
     let whole = Mutex::new((DVec3::INFINITY, DVec3::NEG_INFINITY));
-    over_chunks(surface, surface.vertices(), || Ok(()), |(), range| {
-        let (min, max) = range
-            .filter(|&v| used.get(v))
-            .map(|v| surface.position(v))
-            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), p| (min.min(p), max.max(p)));
-        let mut whole = whole.lock().unwrap_or_else(PoisonError::into_inner);
-        *whole = (whole.0.min(min), whole.1.max(max));
-        Ok(())
-    })?;
+    over_chunks(
+        surface,
+        surface.vertices(),
+        || Ok(()),
+        |(), range| {
+            let (min, max) = range
+                .filter(|&v| used.get(v))
+                .map(|v| surface.position(v))
+                .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), p| (min.min(p), max.max(p)));
+            let mut whole = whole.lock().unwrap_or_else(PoisonError::into_inner);
+            *whole = (whole.0.min(min), whole.1.max(max));
+            Ok(())
+        },
+    )?;
     Ok(whole.into_inner().unwrap_or_else(PoisonError::into_inner))
 }
 

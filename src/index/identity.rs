@@ -4,7 +4,7 @@ use crate::store::{Column, Element, Shelf, StoreError};
 use std::ops::Range;
 
 /// A number of a vertex or triangle: 32 bits where all of a survey fit, else 64.
-pub trait Id: Element + Ord + Default {
+pub(super) trait Id: Element + Ord + Default {
     /// Of a number that fits.
     fn of(number: u64) -> Self;
     /// The number.

@@ -185,8 +185,7 @@ fn sort_triangles<I: identity::Id>(
     room: BuildRoom,
 ) -> Result<(Vec<u64>, Sums), StoreError> {
     let block = room.bytes / 4 / corners::block_bytes(ground.vertices);
-    let scatter =
-        corners::scatter::<I>(surface, &columns.vertex_inputs, shards, shelf, block.max(LEAST_VERTICES))?;
+    let scatter = corners::scatter::<I>(surface, &columns.vertex_inputs, shards, shelf, block.max(LEAST_VERTICES))?;
     let to = triangles::Sorted {
         positions: &columns.positions,
         corners: &columns.corners,

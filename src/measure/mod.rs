@@ -29,7 +29,12 @@ pub struct Wanted {
 /// local vertex, if the survey has colours.
 ///
 /// All sums run by ascending id, so the result is the same bits in every tile that sees the grain whole.
-pub fn measure(mesh: &TileMesh, segment: &Segment, wanted: Wanted, color: &(dyn Fn(u32) -> Option<[f64; 3]> + Sync)) -> Grain {
+pub fn measure(
+    mesh: &TileMesh,
+    segment: &Segment,
+    wanted: Wanted,
+    color: &(dyn Fn(u32) -> Option<[f64; 3]> + Sync),
+) -> Grain {
     let triangles = &segment.triangles;
     let vertices = mesh.vertices_of(triangles);
     let points: Vec<DVec3> = vertices.iter().map(|&v| mesh.positions[v as usize]).collect();

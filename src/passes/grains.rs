@@ -61,7 +61,9 @@ impl Survey<'_> {
         mut collect: impl FnMut(usize, TileFinding) -> Result<(), C>,
     ) -> Result<Vec<LostJob>, Stopped<C>> {
         let stages = Stages {
-            footprint_bytes: |job| TileMesh::footprint_bytes(self.triangles_in(&self.first_block(job, recipe.settings))),
+            footprint_bytes: |job| {
+                TileMesh::footprint_bytes(self.triangles_in(&self.first_block(job, recipe.settings)))
+            },
             work: |job, reservation: &mut Reservation| self.tile(job, recipe, reservation),
         };
         let triangles = jobs.iter().map(|&job| self.triangles_in(self.core(job))).sum();

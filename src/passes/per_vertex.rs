@@ -25,11 +25,7 @@ impl Survey<'_> {
     ///
     /// # Errors
     /// When interrupted.
-    pub fn spacing(
-        &self,
-        crew: &Crew,
-        progress: &dyn Progress,
-    ) -> Result<(f64, Vec<LostJob>), Stopped<Infallible>> {
+    pub fn spacing(&self, crew: &Crew, progress: &dyn Progress) -> Result<(f64, Vec<LostJob>), Stopped<Infallible>> {
         let side_m = self.index.scale.mean_triangle_area_m2.sqrt();
         let mut sum = ExactSum::ZERO;
         let nearest = |field: &NormalField, points: &[DVec3]| nearest_centroid_m(field, points, side_m);

@@ -6,6 +6,7 @@ use super::edges::Edges;
 use super::state::{Labels, NONE, OVERSIZE, State};
 use crate::geometry::{ExactSum, PlanBox};
 use crate::tile::TileMesh;
+use serde::{Deserialize, Serialize};
 
 /// What a tile found.
 #[derive(Debug, Clone, Default)]
@@ -29,7 +30,7 @@ pub struct Segment {
 }
 
 /// The part of an oversize body that lies in a tile's core.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct OversizePiece {
     /// Lowest global triangle id in the core.
     pub anchor: u64,
@@ -79,7 +80,11 @@ pub fn oversize_pieces(mesh: &TileMesh, edges: &Edges, labels: &Labels) -> (Vec<
     (pieces, unsettled)
 }
 
-fn unknown_list(mesh: &TileMesh, labels: &Labels) -> Vec<u32> { (0..labels.state.len() as u32).filter(|&t| mesh.in_core[t as usize] && labels.state[t as usize]==State::Unknown).collect() }
+fn unknown_list(mesh: &TileMesh, labels: &Labels) -> Vec<u32> {
+    (0..labels.state.len() as u32)
+        .filter(|&t| mesh.in_core[t as usize] && labels.state[t as usize] == State::Unknown)
+        .collect()
+}
 fn unknown_in_core(mesh: &TileMesh, labels: &Labels) -> u64 {
     let unknown = |t: &usize| mesh.in_core[*t] && labels.state[*t] == State::Unknown;
     (0..labels.state.len()).filter(unknown).count() as u64
@@ -105,7 +110,8 @@ pub fn settle(
         |t| state[t] == State::Kept && labels.label[t] < OVERSIZE,
         |t| state[t] == State::Unknown,
     );
-    assert!(open_oversize == 0); let unsettled = unknown_list(mesh, labels);
+    assert!(open_oversize == 0);
+    let unsettled = unknown_list(mesh, labels);
     let mut settled = Settled { oversize, unsettled, ..Settled::default() };
     let mut grain_of = vec![NONE; bodies.parts.len()];
     for (part, grain) in bodies.parts.iter().zip(&mut grain_of) {
@@ -113,7 +119,11 @@ pub fn settle(
             continue;
         }
         if !part.closed() {
-            let lowest=part.lowest; let id = bodies.of[lowest as usize]; settled.unsettled.extend((0..state.len() as u32).filter(|&t| bodies.of[t as usize]==id && mesh.in_core[t as usize]));
+            let lowest = part.lowest;
+            let id = bodies.of[lowest as usize];
+            settled
+                .unsettled
+                .extend((0..state.len() as u32).filter(|&t| bodies.of[t as usize] == id && mesh.in_core[t as usize]));
         } else if part.size >= sizes.smallest {
             *grain = settled.grains.len() as u32;
             settled.grains.push(Segment { triangles: Vec::new(), at_mesh_edge: part.at_mesh_edge });

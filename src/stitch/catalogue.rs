@@ -2,6 +2,7 @@
 
 use crate::geometry::PlanBox;
 use crate::measure::Grain;
+use serde::{Deserialize, Serialize};
 
 /// A grain with its number and map colour.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,7 +29,7 @@ pub struct Oversize {
 }
 
 /// How one tile was worked. Of what is found, only this depends on the tiling.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TileReport {
     /// Row-major number of the tile.
     pub tile: u64,

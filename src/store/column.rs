@@ -4,7 +4,8 @@
 //! positions, from any thread; never mapped, since mapped pages would count as memory that the process holds.
 
 use super::StoreError;
-use std::fs::{File, OpenOptions};
+use super::positioned::Positioned;
+use std::fs::OpenOptions;
 use std::marker::PhantomData;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -59,7 +60,7 @@ const PIECE_BYTES: usize = 1 << 18;
 /// A file of elements.
 #[derive(Debug)]
 pub struct Column<T> {
-    file: File,
+    file: Positioned,
     path: PathBuf,
     len: u64,
     of: PhantomData<T>,
@@ -71,10 +72,10 @@ impl<T: Element> Column<T> {
     /// # Errors
     /// The file cannot be made, or not in this length.
     pub fn create(path: &Path, len: u64) -> Result<Column<T>, StoreError> {
-        let failed = |source| StoreError::file(path, "make", source);
+        let failed = |source| StoreError::io(path, "make the column", source);
         let file = OpenOptions::new().read(true).write(true).create(true).truncate(true).open(path).map_err(failed)?;
         file.set_len(len * T::BYTES as u64).map_err(failed)?;
-        Ok(Column { file, path: path.to_owned(), len, of: PhantomData })
+        Ok(Column { file: Positioned::new(file), path: path.to_owned(), len, of: PhantomData })
     }
 
     /// Opens a file that must hold `len` elements, for reading and writing.
@@ -82,13 +83,14 @@ impl<T: Element> Column<T> {
     /// # Errors
     /// It cannot be opened, or has another length.
     pub fn open(path: &Path, len: u64) -> Result<Column<T>, StoreError> {
-        let failed = |source| StoreError::file(path, "open", source);
+        let failed = |source| StoreError::io(path, "open the column", source);
         let file = OpenOptions::new().read(true).write(true).open(path).map_err(failed)?;
         let (found, expected) = (file.metadata().map_err(failed)?.len(), len * T::BYTES as u64);
         if found != expected {
-            return Err(StoreError::Length { path: path.to_owned(), found, expected });
+            let (path, element_bytes) = (path.to_owned(), T::BYTES);
+            return Err(StoreError::ColumnLength { path, elements: len, element_bytes, expected, found });
         }
-        Ok(Column { file, path: path.to_owned(), len, of: PhantomData })
+        Ok(Column { file: Positioned::new(file), path: path.to_owned(), len, of: PhantomData })
     }
 
     /// Number of elements.
@@ -112,7 +114,9 @@ impl<T: Element> Column<T> {
         while at < range.end {
             let n = step.min(range.end - at);
             let part = &mut bytes[..n as usize * T::BYTES];
-            read_at(&self.file, part, at * T::BYTES as u64).map_err(|e| StoreError::file(&self.path, "read", e))?;
+            self.file
+                .read_exact_at(part, at * T::BYTES as u64)
+                .map_err(|e| StoreError::io(&self.path, "read the column", e))?;
             part.chunks_exact(T::BYTES).for_each(|element| take(T::get(element)));
             at += n;
         }
@@ -135,7 +139,7 @@ impl<T: Element> Column<T> {
     pub fn write(&self, first: u64, elements: impl IntoIterator<Item = T>) -> Result<(), StoreError> {
         let mut bytes = vec![0; PIECE_BYTES / T::BYTES * T::BYTES];
         let (mut at, mut filled) = (first * T::BYTES as u64, 0);
-        let write = |part: &[u8], at| write_at(&self.file, part, at).map_err(|e| self.unwritten(e));
+        let write = |part: &[u8], at| self.file.write_all_at(part, at).map_err(|e| self.unwritten(e));
         for element in elements {
             element.put(&mut bytes[filled..filled + T::BYTES]);
             filled += T::BYTES;
@@ -152,45 +156,51 @@ impl<T: Element> Column<T> {
     /// # Errors
     /// The disk says no.
     pub fn sync(&self) -> Result<(), StoreError> {
-        self.file.sync_data().map_err(|e| self.unwritten(e))
+        self.file.file().sync_data().map_err(|e| self.unwritten(e))
     }
 
     fn unwritten(&self, source: std::io::Error) -> StoreError {
-        StoreError::file(&self.path, "write", source)
+        StoreError::io(&self.path, "write the column", source)
     }
 }
 
-#[cfg(unix)]
-pub(super) fn read_at(file: &File, to: &mut [u8], at: u64) -> std::io::Result<()> {
-    std::os::unix::fs::FileExt::read_exact_at(file, to, at)
-}
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use std::fs::File;
 
-#[cfg(unix)]
-pub(super) fn write_at(file: &File, from: &[u8], at: u64) -> std::io::Result<()> {
-    std::os::unix::fs::FileExt::write_all_at(file, from, at)
-}
-
-#[cfg(windows)]
-pub(super) fn read_at(file: &File, mut to: &mut [u8], mut at: u64) -> std::io::Result<()> {
-    use std::os::windows::fs::FileExt;
-    while !to.is_empty() {
-        let n = file.seek_read(to, at)?;
-        if n == 0 {
-            return Err(std::io::ErrorKind::UnexpectedEof.into());
-        }
-        to = &mut to[n..];
-        at += n as u64;
+    #[test]
+    fn elements_come_back_from_where_they_were_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("column");
+        let column = Column::<[f64; 3]>::create(&path, 100_000).unwrap();
+        let element = |i: u64| [i as f64, -1.0 / i as f64, f64::MIN_POSITIVE * i as f64];
+        column.write(50_000, (50_000..100_000).map(element)).unwrap();
+        column.write(10, (10..50_000).map(element)).unwrap();
+        let column = Column::<[f64; 3]>::open(&path, 100_000).unwrap();
+        let mut found = Vec::new();
+        column.read(5..99_990, &mut found).unwrap();
+        assert_eq!(found[..5], [[0.0; 3]; 5]);
+        assert!(found[5..].iter().zip(10..).all(|(&f, i)| f == element(i)));
+        assert!(column.read(99_999..100_001, &mut found).is_err());
     }
-    Ok(())
-}
 
-#[cfg(windows)]
-pub(super) fn write_at(file: &File, mut from: &[u8], mut at: u64) -> std::io::Result<()> {
-    use std::os::windows::fs::FileExt;
-    while !from.is_empty() {
-        let n = file.seek_write(from, at)?;
-        from = &from[n..];
-        at += n as u64;
+    #[test]
+    fn a_column_of_another_length_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("column");
+        Column::<u32>::create(&path, 7).unwrap();
+        let error = Column::<u32>::open(&path, 8).unwrap_err().to_string();
+        assert!(error.contains("has 28 bytes") && error.contains("32"), "{error}");
     }
-    Ok(())
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_full_disk_is_named_as_such() {
+        let full = File::options().read(true).write(true).open("/dev/full").unwrap();
+        let column = Column::<u64> { file: Positioned::new(full), path: "/dev/full".into(), len: 9, of: PhantomData };
+        let error = column.write(0, 0..9).unwrap_err();
+        assert!(matches!(error, StoreError::Full { .. }), "{error}");
+    }
 }

@@ -1,8 +1,7 @@
 //! Scattering: records sorted into buckets on disk, a bucket at a time in memory afterwards.
 
-use super::column::{read_at, write_at};
+use super::positioned::Positioned;
 use super::{Element, Shelf, StoreError};
-use std::fs::File;
 use std::marker::PhantomData;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -14,7 +13,7 @@ const BLOCK_BYTES: usize = 64 << 10;
 /// Buckets of records in one scratch file, which goes when this goes.
 #[derive(Debug)]
 pub struct Scatter<R> {
-    file: File,
+    file: Positioned,
     path: PathBuf,
     end: AtomicU64,
     /// Of each bucket its blocks: first byte and length.
@@ -37,7 +36,7 @@ impl<R: Element> Scatter<R> {
     pub fn new(shelf: &Shelf, name: &str, buckets: usize) -> Result<Scatter<R>, StoreError> {
         let (file, path) = shelf.scratch(name)?;
         let blocks = (0..buckets).map(|_| Mutex::default()).collect();
-        Ok(Scatter { file, path, end: AtomicU64::new(0), blocks, of: PhantomData })
+        Ok(Scatter { file: Positioned::new(file), path, end: AtomicU64::new(0), blocks, of: PhantomData })
     }
 
     /// A writer for one thread. What it has gathered is written by [`ScatterWriter::finish`].
@@ -60,7 +59,9 @@ impl<R: Element> Scatter<R> {
         let mut bytes = Vec::new();
         for (at, len) in blocks {
             bytes.resize(len, 0);
-            read_at(&self.file, &mut bytes, at).map_err(|e| StoreError::file(&self.path, "read", e))?;
+            self.file
+                .read_exact_at(&mut bytes, at)
+                .map_err(|e| StoreError::io(&self.path, "read what was sorted", e))?;
             records.extend(bytes.chunks_exact(R::BYTES).map(R::get));
         }
         Ok(records)
@@ -93,7 +94,7 @@ impl<R: Element> ScatterWriter<'_, R> {
         let of = self.of;
         let buffer = &mut self.buffers[bucket];
         let at = of.end.fetch_add(buffer.len() as u64, Ordering::Relaxed);
-        write_at(&of.file, buffer, at).map_err(|e| StoreError::file(&of.path, "write", e))?;
+        of.file.write_all_at(buffer, at).map_err(|e| StoreError::io(&of.path, "write what is sorted", e))?;
         of.blocks[bucket].lock().unwrap_or_else(PoisonError::into_inner).push((at, buffer.len()));
         buffer.clear();
         Ok(())

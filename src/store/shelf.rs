@@ -16,7 +16,7 @@ impl Shelf {
     /// # Errors
     /// It cannot be made.
     pub fn new(folder: &Path) -> Result<Shelf, StoreError> {
-        fs::create_dir_all(folder).map_err(|e| StoreError::file(folder, "make", e))?;
+        fs::create_dir_all(folder).map_err(|e| StoreError::io(folder, "make the folder", e))?;
         Ok(Shelf { folder: folder.to_owned() })
     }
 
@@ -63,7 +63,7 @@ impl Shelf {
     pub(super) fn scratch(&self, name: &str) -> Result<(File, PathBuf), StoreError> {
         let path = self.path(&format!("{name}.scratch"));
         let made = OpenOptions::new().read(true).write(true).create(true).truncate(true).open(&path);
-        let file = made.map_err(|e| StoreError::file(&path, "make", e))?;
+        let file = made.map_err(|e| StoreError::io(&path, "make the file", e))?;
         // Where open files can be removed it is gone now, even if the run is killed; elsewhere it stays
         // until the shelf is cleared.
         let _ = fs::remove_file(&path);
