@@ -6,6 +6,7 @@ use crate::open::OpenError;
 use crate::pipeline::{Interrupted, LostJob};
 use crate::settings::SettingsError;
 use crate::statistics::RasterError;
+use crate::store::StoreError;
 use crate::write::WriteError;
 
 /// Why a run ended without a result.
@@ -21,6 +22,9 @@ pub enum Error {
     /// The survey cannot be indexed.
     #[error(transparent)]
     Index(#[from] IndexError),
+    /// The work folder cannot be used.
+    #[error(transparent)]
+    Store(#[from] StoreError),
     /// The raster cannot be made.
     #[error(transparent)]
     Raster(#[from] RasterError),

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! [`run`] is the page that shows all of it. A stage may use the stages above it, never those below;
-//! [`pipeline`] schedules tiles and knows no geometry.
+//! [`pipeline`] schedules tiles and [`store`] keeps records on disk; neither knows any geometry.
 
 // What every stage may use.
 pub mod geometry;
@@ -34,8 +34,9 @@ pub mod statistics;
 
 pub mod write;
 
-// What schedules it, and what stands beside it.
+// What schedules it, what keeps its records, and what stands beside it.
 pub mod pipeline;
+pub mod store;
 
 pub mod cli;
 pub mod costs;

@@ -3,17 +3,18 @@
 use crate::costs::{Costs, Meter};
 use crate::curvature::Stencil;
 use crate::error::Error;
-use crate::index::Index;
+use crate::index::{BuildRoom, Index};
 use crate::measure::Wanted;
 use crate::open::Reach;
-use crate::passes::{Pass, Recipe, Survey};
-use crate::pipeline::{Budget, Control, Crew, LostJob, memory_there_bytes};
+use crate::passes::{Recipe, Survey};
+use crate::pipeline::{Budget, Control, Crew, Interrupted, LostJob, memory_there_bytes};
 use crate::progress::{Progress, Unit};
 use crate::segment::smallest_grain_area_m2;
 use crate::settings::Settings;
 use crate::statistics::RasterGrid;
 use crate::stitch::{Catalogue, TileReport, stitch};
-use crate::tile::Plan;
+use crate::store::Shelf;
+use crate::tile::{NormalField, Plan, TileMesh};
 use crate::write::{OutputFolder, Results, WholeMesh, WriteError, write_all};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -72,14 +73,17 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
 
     // index
     progress.begin("index", reach.triangles(), Unit::Triangles);
-    let mut index = crew.pool.install(|| Index::build(&reach))?;
+    let shelf = Shelf::new(&job.out.join("work"))?;
+    let room = BuildRoom { bytes: crew.budget.total_bytes() / 2, ..BuildRoom::default() };
+    let mut index = crew.pool.install(|| Index::build(&reach, &shelf, room))?;
     progress.advance(reach.triangles());
     progress.end();
     control.check()?;
     check_outputs(&reach, &index, settings)?;
 
     // plan
-    let plan = plan(&index, settings, &crew);
+    let plans = plans(&index, settings, &crew);
+    let plan = &plans.grains;
     progress.note(&format!(
         "{} tiles of {:.3} m, {} threads, {} MiB of memory for tiles",
         plan.tiles.len(),
@@ -89,24 +93,41 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     ));
 
     // tile by tile: spacing, curvature, then segment and measure
-    let spacing = Survey { surface: &reach, index: &index, plan: &plan }.spacing(&crew, progress)?;
-    index.scale.spacing_m = whole("spacing", spacing)?;
-    let survey = Survey { surface: &reach, index: &index, plan: &plan };
+    let (spacing_m, lost) =
+        Survey { index: &index, plan: &plans.curvature }.spacing(&crew, progress).map_err(|_| Interrupted)?;
+    none_lost("spacing", lost)?;
+    index.scale.spacing_m = spacing_m;
     let stencil = Stencil::new(index.scale.spacing_m, index.scale.mean_triangle_area_m2, &settings.curvature);
-    let divergence = whole("curvature", survey.divergence(&crew, &stencil, progress)?)?;
+    let divergence = shelf.create("divergence", index.scale.vertices)?;
+    let survey = Survey { index: &index, plan: &plans.curvature };
+    let jobs: Vec<usize> = (0..plans.curvature.tiles.len()).collect();
+    none_lost(
+        "curvature",
+        survey
+            .divergence(&crew, &jobs, &stencil, &divergence, progress, |_, _| Ok::<_, ()>(()))
+            .map_err(|_| Interrupted)?,
+    )?;
     let outline_step_m = reach.frame().outline_step_m();
     let wanted = Wanted { outline_step_m, triangle_ids: settings.output.labelled_mesh };
     let recipe = Recipe { settings: &settings.segment, divergence: &divergence, wanted };
-    let found = survey.grains(&crew, &recipe, progress)?;
+    let survey = Survey { index: &index, plan };
+    let jobs: Vec<usize> = (0..plan.tiles.len()).collect();
+    let mut findings = Vec::new();
+    let found_lost = survey
+        .grains(&crew, &jobs, &recipe, progress, |_, finding| {
+            findings.push(finding);
+            Ok::<_, ()>(())
+        })
+        .map_err(|_| Interrupted)?;
     let tile = |lost: &LostJob| plan.tiles[lost.job].id;
-    found.lost.iter().for_each(|lost| progress.warn(&format!("tile {} is lost: {}", tile(lost), lost.message)));
+    found_lost.iter().for_each(|lost| progress.warn(&format!("tile {} is lost: {}", tile(lost), lost.message)));
 
     // stitch
     let touch_steps = (TOUCH_EDGES * index.scale.mean_edge_m / outline_step_m) as i64;
-    let (catalogue, tiles) = stitch(found.result, touch_steps);
+    let (catalogue, tiles) = stitch(findings, touch_steps);
 
     // statistics and write
-    let mut facts = facts(&reach, &index, &plan, &warnings, &found.lost);
+    let mut facts = facts(&reach, &index, plan, &warnings, &found_lost);
     let segmented_per_triangle = segmented_per_triangle(&tiles);
     facts["segmented_per_triangle"] = segmented_per_triangle.into();
     let mesh = WholeMesh::new(&reach);
@@ -124,7 +145,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
         mesh: settings.output.labelled_mesh.then_some(&mesh),
     };
     let files = write(&folder, &results, progress)?;
-    let (lost, triangles, costs) = (found.lost, reach.triangles(), meter.costs());
+    let (lost, triangles, costs) = (found_lost, reach.triangles(), meter.costs());
     Ok(Outcome { files, catalogue, lost, segmented_per_triangle, triangles, costs })
 }
 
@@ -160,17 +181,31 @@ fn open(job: &Job, progress: &dyn Progress) -> Result<(Reach, Vec<crate::open::W
     Ok(opened?)
 }
 
-fn plan(index: &Index, settings: &Settings, crew: &Crew) -> Plan {
-    let tile_size_m = if settings.work.tile_size_m > 0.0 {
-        settings.work.tile_size_m
-    } else if settings.segment.max_grain_m == 0.0 {
-        // Every tile would have to see the whole survey: one tile does it once.
-        f64::MAX
-    } else {
-        let halo_m = settings.segment.max_grain_m;
-        Plan::size_for_budget(index, halo_m, crew.budget.total_bytes(), crew.pool.current_num_threads())
+/// How the survey is cut, for each kind of pass.
+struct Plans {
+    curvature: Plan,
+    grains: Plan,
+}
+
+/// Largest cores, triangles.
+const LARGEST_CORE: f64 = 8e6;
+const LARGEST_CURVATURE_CORE: f64 = 2e6;
+/// Triangles that a core's halo may add to it.
+const WITH_HALO: f64 = 1.3;
+
+fn plans(index: &Index, settings: &Settings, crew: &Crew) -> Plans {
+    let threads = crew.pool.current_num_threads() as f64;
+    let triangles = index.scale.triangles as f64;
+    let memory = crew.budget.total_bytes() as f64 / threads / WITH_HALO;
+    let cut = |bytes: u64, least: f64, most: f64| {
+        let shared = if threads > 1.0 { triangles / (3.0 * threads) } else { triangles };
+        Plan::side_m(index, (memory / bytes as f64).min(shared.max(least)).min(most))
     };
-    Plan::new(index, tile_size_m)
+    let chosen = |side_m: f64| if settings.work.tile_size_m > 0.0 { settings.work.tile_size_m } else { side_m };
+    Plans {
+        curvature: Plan::new(index, chosen(cut(NormalField::footprint_bytes(1), 2.5e5, LARGEST_CURVATURE_CORE))),
+        grains: Plan::new(index, chosen(cut(TileMesh::footprint_bytes(1), 1e6, LARGEST_CORE))),
+    }
 }
 
 /// Refuses what cannot be written before the long work begins.
@@ -185,10 +220,10 @@ fn check_outputs(reach: &Reach, index: &Index, settings: &Settings) -> Result<()
 }
 
 /// A pass on which everything depends: none of its tiles may be lost.
-fn whole<T>(name: &'static str, pass: Pass<T>) -> Result<T, Error> {
-    match pass.lost.into_iter().next() {
-        Some(lost) => Err(Error::TileFailed { pass: name, lost }),
-        None => Ok(pass.result),
+fn none_lost(pass: &'static str, lost: Vec<LostJob>) -> Result<(), Error> {
+    match lost.into_iter().next() {
+        Some(lost) => Err(Error::TileFailed { pass, lost }),
+        None => Ok(()),
     }
 }
 
@@ -201,7 +236,7 @@ fn write(folder: &OutputFolder, results: &Results, progress: &dyn Progress) -> R
 }
 
 fn segmented_per_triangle(tiles: &[TileReport]) -> f64 {
-    let (loaded, owned) = tiles.iter().fold((0, 0), |(l, o), t| (l + t.loaded_triangles, o + t.core_triangles));
+    let (loaded, owned) = tiles.iter().fold((0, 0), |(l, o), t| (l + t.segmented_triangles, o + t.core_triangles));
     loaded as f64 / owned.max(1) as f64
 }
 

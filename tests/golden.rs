@@ -8,19 +8,21 @@ use gravelometer::curvature::{Stencil, divergence};
 use gravelometer::geometry::{DVec3, sphericity};
 use gravelometer::index::{Index, Scale};
 use gravelometer::measure::{Wanted, measure};
-use gravelometer::open::{MemorySurface, Surface};
+use gravelometer::open::MemorySurface;
 use gravelometer::segment::edges::Edges;
 use gravelometer::segment::state::State;
 use gravelometer::segment::{Segment, Step, segment};
 use gravelometer::settings::Settings;
-use gravelometer::tile::{NormalField, TileMesh};
+use gravelometer::tile::{NormalField, Owned, TileMesh};
 use npyz::npz::NpzArchive;
 use std::collections::BTreeMap;
 use std::path::Path;
 
+/// A golden bed and what the authors' program found, by the survey's numbers.
 struct Golden {
-    surface: MemorySurface,
     index: Index,
+    points: Vec<DVec3>,
+    colors: Vec<[u8; 3]>,
     div: Vec<f64>,
     tri_seg: Vec<i32>,
     masks: BTreeMap<String, Vec<bool>>,
@@ -41,7 +43,7 @@ fn read_mesh(path: &Path) -> MemorySurface {
     for i in 0..n {
         let at = end + 15 * i;
         surface.positions.push(DVec3::new(float(at), float(at + 4), float(at + 8)));
-        surface.colors.push([12, 13, 14].map(|k| f64::from(bytes[at + k]) / 255.0));
+        surface.colors.push([12, 13, 14].map(|k| bytes[at + k]));
     }
     for i in 0..m {
         let at = end + 15 * n + 13 * i;
@@ -61,7 +63,10 @@ fn golden(name: &str) -> Option<Golden> {
     let (labels, stages) =
         (mesh.with_file_name(format!("{name}.npz")), mesh.with_file_name(format!("{name}_stages.npz")));
     let surface = read_mesh(&mesh);
-    let index = Index::build(&surface).unwrap();
+    let index = support::indexed(&surface);
+    // What the authors' files say by the input's numbers is put into the order of the survey's.
+    let triangles = index.triangle_inputs(0..index.scale.triangles).unwrap();
+    let vertices = index.vertex_inputs(0..index.scale.vertices).unwrap();
     let mut masks = BTreeMap::new();
     for stage in [
         "s0_concave",
@@ -75,10 +80,15 @@ fn golden(name: &str) -> Option<Golden> {
         "s6_holes",
     ] {
         let packed: Vec<u8> = read(&stages, stage);
-        let bits = (0..surface.triangles.len()).map(|t| packed[t / 8] >> (7 - t % 8) & 1 == 1).collect();
+        let bits = triangles.iter().map(|&t| packed[t as usize / 8] >> (7 - t % 8) & 1 == 1).collect();
         masks.insert(stage.to_owned(), bits);
     }
-    Some(Golden { index, div: read(&labels, "div"), tri_seg: read(&labels, "tri_seg"), surface, masks })
+    let (div, tri_seg): (Vec<f64>, Vec<i32>) = (read(&labels, "div"), read(&labels, "tri_seg"));
+    let div = vertices.iter().map(|&v| div[v as usize]).collect();
+    let tri_seg = triangles.iter().map(|&t| tri_seg[t as usize]).collect();
+    let points = vertices.iter().map(|&v| surface.positions[v as usize]).collect();
+    let colors = vertices.iter().map(|&v| surface.colors[v as usize]).collect();
+    Some(Golden { index, div, tri_seg, points, colors, masks })
 }
 
 fn preset() -> Settings {
@@ -87,17 +97,17 @@ fn preset() -> Settings {
 
 fn our_divergence(g: &Golden) -> Vec<f64> {
     let scale = g.index.scale;
-    let field = NormalField::load(&g.surface, &g.index, &g.index.grid.all());
+    let field = NormalField::load(&g.index, &g.index.grid.all()).unwrap();
     let side = scale.mean_triangle_area_m2.sqrt();
-    let nearest = gravelometer::curvature::nearest_centroid_m(&field, &g.surface.positions, side);
+    let nearest = gravelometer::curvature::nearest_centroid_m(&field, &g.points, side);
     let spacing = nearest.iter().map(|d| d.unwrap()).sum::<f64>() / nearest.len() as f64;
     let stencil = Stencil::new(spacing, scale.mean_triangle_area_m2, &preset().curvature);
-    divergence(&field, &g.surface.positions, &stencil).into_iter().map(|d| d.unwrap()).collect()
+    divergence(&field, &g.points, &stencil).into_iter().map(|d| d.unwrap()).collect()
 }
 
 fn whole(g: &Golden) -> TileMesh {
     let all = g.index.grid.all();
-    TileMesh::load(&g.surface, &g.index, &all, &all)
+    TileMesh::load(&g.index, Owned::Cells(&all), &all).unwrap()
 }
 
 fn differing(mask: &[bool], state: &[State]) -> usize {
@@ -171,7 +181,7 @@ fn statistics_agree(name: &str, g: &Golden, mesh: &TileMesh, grains: &[Segment])
     let mut worst = 0.0f64;
     for segment in grains {
         let row = &rows[&g.tri_seg[segment.triangles[0] as usize]];
-        let grain = measure(mesh, segment, wanted, &|v| g.surface.color(v));
+        let grain = measure(mesh, segment, wanted, &|v| Some(g.colors[v as usize].map(|c| f64::from(c) / 255.0)));
         let mut axes = [row["A axis"], row["B axis"], row["C axis"]];
         axes.sort_by(|a, b| b.total_cmp(a));
         let (mean, std) = (grain.color_mean.unwrap(), grain.color_std.unwrap());
@@ -211,5 +221,5 @@ fn edges_of_a_golden_mesh_hold_every_side_of_every_triangle() {
     let Some(g) = golden("bed_0.3M") else { return };
     let mesh = whole(&g);
     let edges = Edges::of(&mesh.triangles, mesh.positions.len());
-    assert_eq!(edges.iter().map(|(_, t)| t.len()).sum::<usize>(), 3 * g.surface.triangles() as usize);
+    assert_eq!(edges.iter().map(|(_, t)| t.len()).sum::<usize>(), 3 * g.tri_seg.len());
 }

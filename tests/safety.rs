@@ -64,7 +64,7 @@ fn a_vertex_that_no_face_uses_changes_nothing_however_far_away() {
     let plain = work(&job(&mesh, &folder.path().join("plain"))).unwrap();
     assert!(!plain.catalogue.grains.is_empty());
     surface.positions.push(DVec3::new(20_000.0, 3.0, 1.0));
-    surface.colors.push([0.0; 3]);
+    surface.colors.push([0; 3]);
     let stray = folder.path().join("stray.ply");
     write_ply(&stray, &surface);
     let with_stray = work(&job(&stray, &folder.path().join("stray"))).unwrap();

@@ -7,19 +7,18 @@ mod support;
 use glam::{DMat3, DQuat};
 use gravelometer::curvature::{Stencil, divergence, nearest_centroid_m};
 use gravelometer::geometry::DVec3;
-use gravelometer::index::Index;
 use gravelometer::measure::attitude::Attitude;
 use gravelometer::measure::{Grain, Wanted, measure};
-use gravelometer::open::{MemorySurface, Surface};
+use gravelometer::open::MemorySurface;
 use gravelometer::segment::Segment;
 use gravelometer::settings::CurvatureSettings;
-use gravelometer::tile::{NormalField, TileMesh};
+use gravelometer::tile::{NormalField, Owned, TileMesh};
 use support::bed::{Rng, ball};
 
 /// Divergence at every vertex of a surface, with the published stencil, and the spacing.
 fn divergence_of(surface: &MemorySurface) -> (Vec<f64>, f64) {
-    let index = Index::build(surface).unwrap();
-    let field = NormalField::load(surface, &index, &index.grid.all());
+    let index = support::indexed(surface);
+    let field = NormalField::load(&index, &index.grid.all()).unwrap();
     let area_m2 = index.scale.mean_triangle_area_m2;
     let nearest = nearest_centroid_m(&field, &surface.positions, area_m2.sqrt());
     let spacing = nearest.iter().map(|d| d.unwrap()).sum::<f64>() / nearest.len() as f64;
@@ -111,12 +110,15 @@ fn a_saddle_has_no_divergence_at_its_centre() {
 
 /// Measures the whole surface as one grain.
 fn measured(surface: &MemorySurface) -> Grain {
-    let index = Index::build(surface).unwrap();
+    let index = support::indexed(surface);
     let all = index.grid.all();
-    let mesh = TileMesh::load(surface, &index, &all, &all);
+    let mesh = TileMesh::load(&index, Owned::Cells(&all), &all).unwrap();
+    let inputs = index.vertex_inputs(0..index.scale.vertices).unwrap();
     let segment = Segment { triangles: (0..mesh.triangles.len() as u32).collect(), at_mesh_edge: false };
     let wanted = Wanted { outline_step_m: 1.0 / 1_048_576.0, triangle_ids: false };
-    measure(&mesh, &segment, wanted, &|v| surface.color(v))
+    measure(&mesh, &segment, wanted, &|v| {
+        Some(surface.colors.get(inputs[v as usize] as usize)?.map(|c| f64::from(c) / 255.0))
+    })
 }
 
 /// An ellipsoid of full axes `axes_m`, its axes along the columns of `turn`.

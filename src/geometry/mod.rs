@@ -8,8 +8,10 @@ mod hull;
 pub use glam::DVec3;
 pub use hull::{Hull, flatter_than, hull, sphericity};
 
+use serde::{Deserialize, Serialize};
+
 /// A rectangle in plan, metres in the local frame. A side may be infinite.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PlanBox {
     /// West and south side.
     pub min: [f64; 2],
@@ -49,9 +51,11 @@ pub fn triangle_area(corners: [DVec3; 3]) -> f64 {
     0.5 * (corners[1] - corners[0]).cross(corners[2] - corners[0]).length()
 }
 
-/// Centroid of a triangle. The order of the additions is fixed, so that every tile gets the same bits.
+/// Centroid of a triangle. The order of the additions is fixed, so that every tile gets the same bits; it never
+/// lies outside the corners' box, as rounding could put it.
 pub fn triangle_centroid(corners: [DVec3; 3]) -> DVec3 {
-    ((corners[0] + corners[1]) + corners[2]) / 3.0
+    let [a, b, c] = corners;
+    (((a + b) + c) / 3.0).max(a.min(b).min(c)).min(a.max(b).max(c))
 }
 
 /// Unit normal of a triangle by the right-hand rule; zero for a triangle of no area.
@@ -66,7 +70,7 @@ pub fn triangle_normal(corners: [DVec3; 3]) -> DVec3 {
 /// Terms are truncated to multiples of 2^-64 and added as integers, so that survey-wide means are the
 /// same bits whatever the tiling, the thread count or the order of the file. Terms must be finite;
 /// their sum must stay below 2^62, far above the area of a survey that is at most 100 km wide.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ExactSum(i128);
 
 impl ExactSum {

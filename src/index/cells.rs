@@ -64,6 +64,11 @@ impl CellGrid {
         cell[1] as usize * self.columns as usize + cell[0] as usize
     }
 
+    /// Column and row of a cell by its number.
+    pub fn place(&self, number: usize) -> [u32; 2] {
+        [(number % self.columns as usize) as u32, (number / self.columns as usize) as u32]
+    }
+
     /// The block of all cells.
     pub fn all(&self) -> CellBlock {
         CellBlock { columns: 0..self.columns, rows: 0..self.rows }
@@ -104,53 +109,55 @@ impl CellBlock {
     }
 }
 
-/// Which elements lie in which cell: for each cell its elements in ascending order.
-#[derive(Debug, Clone, Default)]
-pub struct CellLists {
-    start: Vec<u64>,
-    ids: Vec<u64>,
-}
+/// How many elements lie in each cell, when elements are numbered by cell: those of a row of cells follow
+/// one another.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct CellStarts(Vec<u64>);
 
-impl CellLists {
-    /// Sorts elements 0, 1, 2, ... into the cells given by their numbers.
-    pub fn build(cells: usize, cell_of: &[u32]) -> CellLists {
-        let mut start = vec![0u64; cells + 1];
-        for &cell in cell_of {
-            start[cell as usize + 1] += 1;
-        }
-        for i in 0..cells {
-            start[i + 1] += start[i];
-        }
-        let mut next = start.clone();
-        let mut ids = vec![0u64; cell_of.len()];
-        for (id, &cell) in cell_of.iter().enumerate() {
-            let slot = &mut next[cell as usize];
-            ids[*slot as usize] = id as u64;
-            *slot += 1;
-        }
-        CellLists { start, ids }
+impl CellStarts {
+    /// From the first element of each cell, with the end behind the last.
+    pub(super) fn new(start: Vec<u64>) -> CellStarts {
+        CellStarts(start)
     }
 
-    /// Elements of the block, ascending.
-    pub fn in_block(&self, grid: &CellGrid, block: &CellBlock) -> Vec<u64> {
-        let mut found = Vec::with_capacity(self.count(grid, block) as usize);
-        for span in self.spans(grid, block) {
-            found.extend_from_slice(&self.ids[span]);
+    /// The first element of each cell, with the end behind the last.
+    pub(super) fn starts(&self) -> &[u64] {
+        &self.0
+    }
+
+    /// Elements of the block: one range for each row, ascending; ranges that meet are one.
+    pub fn ranges(&self, grid: &CellGrid, block: &CellBlock) -> Vec<Range<u64>> {
+        let mut ranges: Vec<Range<u64>> = Vec::new();
+        for row in self.rows(grid, block).filter(|row| !row.is_empty()) {
+            match ranges.last_mut() {
+                Some(last) if last.end == row.start => last.end = row.end,
+                _ => ranges.push(row),
+            }
         }
-        found.sort_unstable();
-        found
+        ranges
+    }
+
+    /// Number of the cell that holds an element, and the first element behind that cell.
+    pub fn cell_of(&self, element: u64) -> (usize, u64) {
+        let behind = self.0.partition_point(|&start| start <= element);
+        (behind - 1, self.0[behind])
     }
 
     /// Number of elements in the block.
     pub fn count(&self, grid: &CellGrid, block: &CellBlock) -> u64 {
-        self.spans(grid, block).map(|s| s.len() as u64).sum()
+        self.rows(grid, block).map(|row| row.end - row.start).sum()
+    }
+
+    /// Number of cells that hold anything.
+    pub fn occupied_cells(&self) -> u64 {
+        self.0.windows(2).filter(|w| w[1] > w[0]).count() as u64
     }
 
     /// Boxes in plan, local metres, of the runs of cells that hold anything: where the survey is.
     pub fn occupied(&self, grid: &CellGrid) -> Vec<PlanBox> {
         let holds = |column: u32, row: u32| {
             let cell = grid.number([column, row]);
-            self.start[cell + 1] > self.start[cell]
+            self.0[cell + 1] > self.0[cell]
         };
         let mut boxes = Vec::new();
         for row in 0..grid.rows {
@@ -169,13 +176,12 @@ impl CellLists {
         boxes
     }
 
-    /// One run of elements for each row of the block: cells of a row lie side by side.
-    fn spans<'a>(&'a self, grid: &'a CellGrid, block: &'a CellBlock) -> impl Iterator<Item = Range<usize>> + 'a {
+    fn rows<'a>(&'a self, grid: &'a CellGrid, block: &'a CellBlock) -> impl Iterator<Item = Range<u64>> + 'a {
         let columns = block.columns.clone();
         block.rows.clone().filter(move |_| !columns.is_empty()).map(move |row| {
             let first = grid.number([block.columns.start, row]);
             let last = grid.number([block.columns.end - 1, row]);
-            self.start[first] as usize..self.start[last + 1] as usize
+            self.0[first]..self.0[last + 1]
         })
     }
 }

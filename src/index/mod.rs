@@ -1,22 +1,35 @@
-//! Indexing: one pass over the survey sorts its triangles into square cells in plan and gathers what
-//! must be the same for every tile.
+//! Indexing: the survey is sorted on disk into square cells in plan, and what must be the same for every
+//! tile is gathered on the way.
 //!
-//! Cost: about 20 bytes per triangle and 16 per vertex, held in memory in this version.
+//! Vertices and triangles get new numbers, by cell: row by row from the south-west, then by position. A tile
+//! is then a few sequential reads, however the input was ordered, and the same surface has the same numbers
+//! in whatever order its file is. Everything later knows elements by these numbers.
+//!
+//! ```text
+//!  look (used vertices, grid) -> sort vertices -> their new numbers into the triangles -> sort triangles
+//! ```
+//!
+//! Memory does not grow with the survey but for a bit for each vertex and 16 bytes for each cell (of about 64
+//! triangles). On disk it takes about 45 bytes for each triangle.
 
 mod cells;
+mod chunks;
+mod corners;
+mod ground;
+mod identity;
 mod scale;
+mod shards;
+mod triangles;
+mod vertices;
 
-pub use cells::{CellBlock, CellGrid, CellLists};
+pub use cells::{CellBlock, CellGrid, CellStarts};
 pub use scale::Scale;
 
-use crate::geometry::{DVec3, ExactSum, triangle_area, triangle_centroid};
+use crate::geometry::{DVec3, ExactSum};
 use crate::open::Surface;
-use rayon::prelude::*;
-
-/// Elements handled by one parallel task: large enough to hide its cost, small enough to share out.
-const CHUNK: u64 = 1 << 16;
-/// Triangles in an average cell: tiles are whole cells, so this is how finely a tile can be cut.
-const TRIANGLES_PER_CELL: f64 = 256.0;
+use crate::store::{Column, Shelf, StoreError};
+use identity::Numbers;
+use std::ops::Range;
 
 /// A survey that cannot be indexed.
 #[derive(Debug, thiserror::Error)]
@@ -30,122 +43,208 @@ pub enum IndexError {
         /// How many triangles there are.
         triangles: u64,
     },
+    /// The work folder cannot be used.
+    #[error(transparent)]
+    Store(#[from] StoreError),
 }
 
 /// Where everything is, and the numbers that all tiles share.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct Index {
     /// Cells in plan.
     pub grid: CellGrid,
     /// Triangles by the cell of their centroid.
-    pub triangles: CellLists,
-    /// Vertices by cell; those that no triangle uses lie in the nearest.
-    pub vertices: CellLists,
-    /// How many triangle corners meet at each vertex of the survey. A tile that has loaded as many
-    /// knows that it sees all there is around that vertex.
-    pub valence: Vec<u32>,
+    pub triangles: CellStarts,
+    /// Vertices that triangles use, by their cell.
+    pub vertices: CellStarts,
     /// Survey-wide figures. `spacing_m` is 0 until it has been measured.
     pub scale: Scale,
+    columns: Columns,
 }
 
-impl Index {
-    /// Indexes a survey.
-    ///
-    /// # Errors
-    /// [`IndexError::NoArea`] when no triangle has any area.
-    pub fn build(surface: &dyn Surface) -> Result<Index, IndexError> {
-        let mut valence = vec![0u32; surface.vertices() as usize];
-        for t in 0..surface.triangles() {
-            for v in surface.triangle(t) {
-                valence[v as usize] += 1;
-            }
-        }
-        let scale = figures(surface, &valence);
-        if scale.mean_triangle_area_m2 <= 0.0 {
-            return Err(IndexError::NoArea { triangles: scale.triangles });
-        }
-        let grid =
-            CellGrid::over(scale.min, scale.max, scale.triangles, scale.mean_triangle_area_m2, TRIANGLES_PER_CELL);
-        let place = |p: DVec3| grid.number(grid.cell_of(p)) as u32;
-        let of_triangle: Vec<u32> =
-            (0..scale.triangles).into_par_iter().map(|t| place(triangle_centroid(surface.corners(t)))).collect();
-        let triangles = CellLists::build(grid.len(), &of_triangle);
-        drop(of_triangle);
-        let of_vertex: Vec<u32> = (0..scale.vertices).into_par_iter().map(|v| place(surface.position(v))).collect();
-        let vertices = CellLists::build(grid.len(), &of_vertex);
-        drop(of_vertex);
-        Ok(Index { grid, triangles, vertices, valence, scale })
+/// What the index keeps on disk.
+#[derive(Debug)]
+struct Columns {
+    positions: Column<[f64; 3]>,
+    valences: Column<u16>,
+    corners: Numbers<3>,
+    vertex_inputs: Numbers<1>,
+    triangle_inputs: Numbers<1>,
+    colors: Option<(f64, Column<[f32; 3]>)>,
+}
+
+/// How an index may be built. Never changes what is in it.
+#[derive(Debug, Clone, Copy)]
+pub struct BuildRoom {
+    /// Memory, bytes.
+    pub bytes: u64,
+    /// Whether numbers take 64 bits even where 32 are enough.
+    pub wide: bool,
+}
+
+impl Default for BuildRoom {
+    fn default() -> BuildRoom {
+        BuildRoom { bytes: 256 << 20, wide: false }
     }
 }
 
+/// Around a vertex of so many triangles or more, counting says nothing.
+pub const MOST_COUNTED: u16 = u16::MAX;
+
+impl Index {
+    /// Indexes a survey onto a shelf. Uses the threads of the pool in which it runs.
+    ///
+    /// # Errors
+    /// [`IndexError::NoArea`] when no triangle has any area; [`IndexError::Store`] when the disk is full or
+    /// otherwise not usable.
+    pub fn build(surface: &dyn Surface, shelf: &Shelf, room: BuildRoom) -> Result<Index, IndexError> {
+        let ground = ground::look(surface)?;
+        let fits = |n: u64| n <= u64::from(u32::MAX);
+        let wide = room.wide || !fits(surface.vertices()) || !fits(surface.triangles());
+        let shards = shards::cut(&ground.in_row, shard_vertices(ground.vertices, room));
+        let columns = Columns {
+            positions: shelf.create("positions", ground.vertices)?,
+            valences: shelf.create("valences", ground.vertices)?,
+            corners: Numbers::create(shelf, "corners", surface.triangles(), wide)?,
+            vertex_inputs: Numbers::create(shelf, "vertex_inputs", ground.vertices, wide)?,
+            triangle_inputs: Numbers::create(shelf, "triangle_inputs", surface.triangles(), wide)?,
+            colors: match surface.full_color() {
+                Some(full) => Some((full, shelf.create("colors", ground.vertices)?)),
+                None => None,
+            },
+        };
+        let to = vertices::Sorted {
+            positions: &columns.positions,
+            inputs: &columns.vertex_inputs,
+            colors: columns.colors.as_ref().map(|(_, column)| column),
+        };
+        let vertices = CellStarts::new(vertices::sort(surface, &ground, &shards, shelf, &to)?);
+        let (triangles, sums) = if wide {
+            sort_triangles::<u64>(surface, &ground, &shards, shelf, &columns, room)?
+        } else {
+            sort_triangles::<u32>(surface, &ground, &shards, shelf, &columns, room)?
+        };
+        let scale = sums.scale(&ground, surface.triangles());
+        if scale.mean_triangle_area_m2 <= 0.0 {
+            return Err(IndexError::NoArea { triangles: scale.triangles });
+        }
+        Ok(Index { grid: ground.grid, triangles: CellStarts::new(triangles), vertices, scale, columns })
+    }
+
+    /// Hands the corners of a range of triangles to `take`, in order.
+    ///
+    /// # Errors
+    /// The disk says no.
+    pub fn each_corners(&self, triangles: Range<u64>, take: impl FnMut([u64; 3])) -> Result<(), StoreError> {
+        self.columns.corners.each(triangles, take)
+    }
+
+    /// Positions of vertices, local metres.
+    pub fn positions(&self) -> &Column<[f64; 3]> {
+        &self.columns.positions
+    }
+
+    /// How many triangle corners meet at each vertex of the survey; [`MOST_COUNTED`] for more. A tile that has
+    /// loaded as many knows that it sees all there is around that vertex.
+    pub fn valences(&self) -> &Column<u16> {
+        &self.columns.valences
+    }
+
+    /// Colours of vertices as the input has them, red, green, blue, and what stands for full colour.
+    pub fn colors(&self) -> Option<(f64, &Column<[f32; 3]>)> {
+        self.columns.colors.as_ref().map(|(full, column)| (*full, column))
+    }
+
+    /// The input's numbers of a range of triangles.
+    ///
+    /// # Errors
+    /// The disk says no.
+    pub fn triangle_inputs(&self, triangles: Range<u64>) -> Result<Vec<u64>, StoreError> {
+        let mut found = Vec::with_capacity((triangles.end - triangles.start) as usize);
+        self.columns.triangle_inputs.each(triangles, |[input]| found.push(input))?;
+        Ok(found)
+    }
+
+    /// The input's numbers of a range of vertices.
+    ///
+    /// # Errors
+    /// The disk says no.
+    pub fn vertex_inputs(&self, vertices: Range<u64>) -> Result<Vec<u64>, StoreError> {
+        let mut found = Vec::with_capacity((vertices.end - vertices.start) as usize);
+        self.columns.vertex_inputs.each(vertices, |[input]| found.push(input))?;
+        Ok(found)
+    }
+}
+
+fn sort_triangles<I: identity::Id>(
+    surface: &dyn Surface,
+    ground: &ground::Ground,
+    shards: &[shards::Shard],
+    shelf: &Shelf,
+    columns: &Columns,
+    room: BuildRoom,
+) -> Result<(Vec<u64>, Sums), StoreError> {
+    let block = room.bytes / 4 / corners::block_bytes(ground.vertices);
+    let scatter = corners::scatter::<I>(surface, &columns.vertex_inputs, shards, shelf, block.max(LEAST_VERTICES))?;
+    let to = triangles::Sorted {
+        positions: &columns.positions,
+        corners: &columns.corners,
+        inputs: &columns.triangle_inputs,
+        valences: &columns.valences,
+    };
+    triangles::sort::<I>(&scatter, &ground.grid, shards, &to)
+}
+
+/// Vertices of a shard or of a block, at least.
+const LEAST_VERTICES: u64 = 1 << 12;
+
+/// Vertices of a shard: what half of the memory holds, shared by the threads; fewer where that gives each
+/// thread several to choose from.
+fn shard_vertices(vertices: u64, room: BuildRoom) -> u64 {
+    let threads = rayon::current_num_threads() as u64;
+    let width = if room.wide { 2 } else { 1 };
+    let each = vertices::SORTING_BYTES.max(2 * width * triangles::SORTING_BYTES);
+    (room.bytes / 2 / threads / each).min(vertices / (4 * threads)).max(LEAST_VERTICES)
+}
+
+/// Sums over all triangles, and what they give.
 #[derive(Clone)]
 struct Sums {
-    min: DVec3,
-    max: DVec3,
     area: ExactSum,
     edges: ExactSum,
     zero_area: u64,
 }
 
 impl Sums {
-    const NOTHING: Sums = Sums {
-        min: DVec3::INFINITY,
-        max: DVec3::NEG_INFINITY,
-        area: ExactSum::ZERO,
-        edges: ExactSum::ZERO,
-        zero_area: 0,
-    };
+    const NOTHING: Sums = Sums { area: ExactSum::ZERO, edges: ExactSum::ZERO, zero_area: 0 };
+
+    fn add(&mut self, c: [DVec3; 3], area_m2: f64) {
+        self.area.add(area_m2);
+        self.zero_area += u64::from(area_m2 == 0.0);
+        for i in 0..3 {
+            self.edges.add((c[(i + 1) % 3] - c[i]).length());
+        }
+    }
 
     fn merge(mut self, other: Sums) -> Sums {
-        self.min = self.min.min(other.min);
-        self.max = self.max.max(other.max);
         self.area.merge(other.area);
         self.edges.merge(other.edges);
         self.zero_area += other.zero_area;
         self
     }
-}
 
-fn chunks(n: u64) -> impl ParallelIterator<Item = std::ops::Range<u64>> {
-    (0..n.div_ceil(CHUNK)).into_par_iter().map(move |c| c * CHUNK..((c + 1) * CHUNK).min(n))
-}
-
-fn figures(surface: &dyn Surface, valence: &[u32]) -> Scale {
-    let (vertices, triangles) = (surface.vertices(), surface.triangles());
-    let of_vertices = chunks(vertices)
-        .map(|range| {
-            range.filter(|&v| valence[v as usize] > 0).fold(Sums::NOTHING, |mut sums, v| {
-                let p = surface.position(v);
-                sums.min = sums.min.min(p);
-                sums.max = sums.max.max(p);
-                sums
-            })
-        })
-        .reduce(|| Sums::NOTHING, Sums::merge);
-    let of_triangles = chunks(triangles)
-        .map(|range| {
-            range.fold(Sums::NOTHING, |mut sums, t| {
-                let c = surface.corners(t);
-                let area = triangle_area(c);
-                sums.area.add(area);
-                sums.zero_area += u64::from(area == 0.0);
-                for i in 0..3 {
-                    sums.edges.add((c[(i + 1) % 3] - c[i]).length());
-                }
-                sums
-            })
-        })
-        .reduce(|| Sums::NOTHING, Sums::merge);
-    let n = triangles.max(1) as f64;
-    Scale {
-        vertices,
-        triangles,
-        min: of_vertices.min,
-        max: of_vertices.max,
-        surface_area_m2: of_triangles.area.value(),
-        mean_triangle_area_m2: of_triangles.area.value() / n,
-        mean_edge_m: of_triangles.edges.value() / (3.0 * n),
-        spacing_m: 0.0,
-        zero_area_triangles: of_triangles.zero_area,
+    fn scale(&self, ground: &ground::Ground, triangles: u64) -> Scale {
+        let n = triangles.max(1) as f64;
+        Scale {
+            vertices: ground.vertices,
+            triangles,
+            min: ground.min,
+            max: ground.max,
+            surface_area_m2: self.area.value(),
+            mean_triangle_area_m2: self.area.value() / n,
+            mean_edge_m: self.edges.value() / (3.0 * n),
+            spacing_m: 0.0,
+            zero_area_triangles: self.zero_area,
+        }
     }
 }

@@ -5,7 +5,7 @@ use crate::geometry::DVec3;
 /// Survey-wide figures, from exact sums: the same bits whatever the tiling or the order of the file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scale {
-    /// Number of vertices, unused ones included.
+    /// Number of vertices that triangles use.
     pub vertices: u64,
     /// Number of triangles, zero-area ones included.
     pub triangles: u64,

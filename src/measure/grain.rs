@@ -1,6 +1,7 @@
 //! A grain: what one settled segment of the surface says about the stone under it.
 
 use crate::geometry::DVec3;
+use serde::{Deserialize, Serialize};
 
 /// One polygon of an outline: the outer ring counter-clockwise, holes clockwise, none closed (the first
 /// point is not repeated), in steps of the outline grid from the local origin
@@ -11,7 +12,7 @@ pub type Polygon = Vec<Vec<[i64; 2]>>;
 ///
 /// It is measured from the visible part of the stone only: buried and hidden flanks are not guessed, so
 /// `axes_m[2]`, volume and hull area are lower bounds.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Grain {
     /// Smallest global triangle id of the grain: names it whatever the tiling.
     pub anchor: u64,

@@ -26,10 +26,15 @@ pub struct Wanted {
 }
 
 /// Measures the grain that one segment shows. `color` gives the colour of a
-/// global vertex, if the survey has colours.
+/// local vertex, if the survey has colours.
 ///
 /// All sums run by ascending id, so the result is the same bits in every tile that sees the grain whole.
-pub fn measure(mesh: &TileMesh, segment: &Segment, wanted: Wanted, color: &dyn Fn(u64) -> Option<[f64; 3]>) -> Grain {
+pub fn measure(
+    mesh: &TileMesh,
+    segment: &Segment,
+    wanted: Wanted,
+    color: &(dyn Fn(u32) -> Option<[f64; 3]> + Sync),
+) -> Grain {
     let triangles = &segment.triangles;
     let vertices = mesh.vertices_of(triangles);
     let points: Vec<DVec3> = vertices.iter().map(|&v| mesh.positions[v as usize]).collect();
@@ -37,8 +42,8 @@ pub fn measure(mesh: &TileMesh, segment: &Segment, wanted: Wanted, color: &dyn F
     let hull = hull(&points);
     let (outline, footprint_area_m2) = outline(mesh, triangles, wanted.outline_step_m);
     let (centroid, surface_area_m2) = centroid_and_area(mesh, triangles);
-    let (color_mean, color_std) = colors(vertices.iter().map(|&v| color(mesh.vertex_ids[v as usize])));
-    let ids = || triangles.iter().map(|&t| mesh.triangle_ids[t as usize]);
+    let (color_mean, color_std) = colors(vertices.iter().map(|&v| color(v)));
+    let ids = || triangles.iter().map(|&t| mesh.triangle_id(t));
     Grain {
         anchor: ids().next().unwrap_or(u64::MAX),
         triangles: triangles.len() as u64,

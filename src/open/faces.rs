@@ -169,7 +169,7 @@ fn read_fixed(
     let flaw = (0..element.count.div_ceil(CHUNK)).into_par_iter().find_map_first(|chunk| {
         let (first, last) = (chunk * CHUNK, ((chunk + 1) * CHUNK).min(element.count));
         let flaw = (first..last).find_map(look);
-        progress.add((last - first) * stride);
+        source.passed(progress, (last - first) * stride);
         flaw
     });
     match flaw {
@@ -215,7 +215,7 @@ fn read_walking(
         triangles += entries - 2;
         at = after.end(end, face)?;
         if face % CHUNK == CHUNK - 1 {
-            progress.add(at - told);
+            source.passed(progress, at - told);
             told = at;
         }
     }

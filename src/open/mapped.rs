@@ -8,11 +8,12 @@
 #![allow(unsafe_code)]
 
 use super::error::OpenError;
-use memmap2::Mmap;
+use memmap2::{Mmap, UncheckedAdvice};
 use std::fs::{self, File};
 use std::io::ErrorKind;
 use std::ops::Deref;
 use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::UNIX_EPOCH;
 
 /// The bytes of one input file.
@@ -20,7 +21,12 @@ use std::time::UNIX_EPOCH;
 pub(super) struct MappedFile {
     map: Mmap,
     modified_s: i64,
+    /// Bytes passed since the pages were last let go.
+    passed: AtomicU64,
 }
+
+/// Pages are let go after so many bytes: few enough not to count, enough to be cheap.
+const KEPT_BYTES: u64 = 32 << 20;
 
 impl MappedFile {
     /// Maps a file for reading.
@@ -55,7 +61,23 @@ impl MappedFile {
             .ok()
             .and_then(|t| t.duration_since(UNIX_EPOCH).ok())
             .map_or(0, |t| i64::try_from(t.as_secs()).unwrap_or(i64::MAX));
-        Ok(MappedFile { map, modified_s })
+        Ok(MappedFile { map, modified_s, passed: AtomicU64::new(0) })
+    }
+
+    /// Says that so many bytes were read and are not needed soon.
+    pub(super) fn passed(&self, bytes: u64) {
+        if self.passed.fetch_add(bytes, Ordering::Relaxed) + bytes >= KEPT_BYTES {
+            self.release();
+        }
+    }
+
+    /// Lets go of the pages that were read: they no longer count as memory of this process. The system may
+    /// keep them, and reads them again when they are asked for.
+    pub(super) fn release(&self) {
+        self.passed.store(0, Ordering::Relaxed);
+        // SAFETY: the map is shared, read-only and backed by a file, so that a page that is dropped comes back
+        // with the same bytes at the next access; slices into it stay valid. On failure nothing has changed.
+        let _ = unsafe { self.map.unchecked_advise(UncheckedAdvice::DontNeed) };
     }
 
     /// Time of the last change, seconds since 1970; 0 where the file system does not tell.

@@ -74,6 +74,11 @@ impl PlyMesh {
         &self.bytes
     }
 
+    /// Lets go of the file's pages.
+    pub(super) fn release(&self) {
+        self.bytes.release();
+    }
+
     /// Time of the file's last change, seconds since 1970.
     pub(super) fn modified_s(&self) -> i64 {
         self.bytes.modified_s()

@@ -7,6 +7,7 @@ use super::mapped::MappedFile;
 use super::ply::PlyMesh;
 use super::precision::{COARSEST_STEP_IN_EDGES, coarsest_step};
 use super::progress::Progress;
+use super::scalar::Scalar;
 use super::survey_file::SurveyFile;
 use super::warning::Warning;
 use crate::geometry::DVec3;
@@ -23,7 +24,7 @@ pub struct Reach {
     files: Vec<SurveyFile>,
     frame: Frame,
     bounds: ([f64; 3], [f64; 3]),
-    has_colors: bool,
+    full_color: Option<f64>,
 }
 
 /// Longest survey along an axis, metres. Keeps squares and sums of areas far from the limits of their types.
@@ -55,8 +56,10 @@ impl Reach {
         let bounds = joint_bounds(&files);
         let frame = make_frame(input, reference, &bounds);
         check_extent(&files, &frame, &bounds)?;
+        let bytes = files.iter().all(|f| f.color_type() == Some(Scalar::U8));
         let has_colors = files.iter().all(|f| f.color_type().is_some());
-        let reach = Reach { files, frame, bounds, has_colors };
+        let full_color = has_colors.then_some(if bytes { 255.0 } else { 1.0 });
+        let reach = Reach { files, frame, bounds, full_color };
         reach.check_precision()?;
         let warnings = reach.warnings(input);
         Ok((reach, warnings))
@@ -94,7 +97,7 @@ impl Reach {
 
     /// Whether every vertex has a colour.
     pub fn has_colors(&self) -> bool {
-        self.has_colors
+        self.full_color.is_some()
     }
 
     /// Place of a vertex, local metres.
@@ -133,11 +136,33 @@ impl Reach {
     /// Above the last vertex.
     #[inline]
     pub fn color(&self, vertex: u64) -> Option<[f64; 3]> {
-        if !self.has_colors {
+        if self.full_color.is_none() {
             return None;
         }
         let file = self.file_of(vertex, |f| f.first_vertex);
         file.mesh.vertices.color(file.mesh.bytes(), vertex - file.first_vertex)
+    }
+
+    /// What stands for full colour in [`Reach::raw_color`]: 255 where all files have colours of one byte,
+    /// else 1; none unless every vertex has a colour.
+    pub fn full_color(&self) -> Option<f64> {
+        self.full_color
+    }
+
+    /// Red, green and blue of a vertex, in parts of [`Reach::full_color`]; zero without colours.
+    ///
+    /// # Panics
+    /// Above the last vertex.
+    #[inline]
+    pub fn raw_color(&self, vertex: u64) -> [f32; 3] {
+        let (Some(full), Some(color)) = (self.full_color, self.color(vertex)) else { return [0.0; 3] };
+        // Whole numbers again where they were: 255 times a 255th rounds to one.
+        color.map(|c| (c * full) as f32)
+    }
+
+    /// Lets go of all pages of the files: they are read again when they are needed.
+    pub fn release(&self) {
+        self.files.iter().for_each(|f| f.mesh.release());
     }
 
     #[inline]
@@ -204,7 +229,7 @@ impl Reach {
                 warnings.push(Warning::ColoursIgnored { path: name(file), reason: reason.clone() });
             }
         }
-        if !self.has_colors
+        if !self.has_colors()
             && self.files.iter().any(|f| f.color_type().is_some())
             && let Some(without) = self.files.iter().find(|f| f.color_type().is_none())
         {

@@ -1,6 +1,7 @@
 //! Where the records of an element lie: at a fixed stride, or one behind the other where they hold lists.
 
 use super::error::OpenError;
+use super::mapped::MappedFile;
 use super::ply_header::{Element, Kind};
 use super::progress::Progress;
 use super::scalar::Scalar;
@@ -12,7 +13,15 @@ pub(super) const CHUNK: u64 = 1 << 16;
 #[derive(Clone, Copy)]
 pub(super) struct Source<'a> {
     pub(super) path: &'a str,
-    pub(super) bytes: &'a [u8],
+    pub(super) bytes: &'a MappedFile,
+}
+
+impl Source<'_> {
+    /// Says that so many bytes are done and not needed for now.
+    pub(super) fn passed(&self, progress: &Progress<'_>, bytes: u64) {
+        self.bytes.passed(bytes);
+        progress.add(bytes);
+    }
 }
 
 /// Start bytes of an element's records.
@@ -157,7 +166,7 @@ pub(super) fn locate(
         }
         at = walk.end(at, index)?;
         if index % CHUNK == CHUNK - 1 {
-            progress.add(at - told);
+            source.passed(progress, at - told);
             told = at;
         }
     }

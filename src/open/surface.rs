@@ -16,8 +16,13 @@ pub trait Surface: Sync {
     fn position(&self, vertex: u64) -> DVec3;
     /// The three vertices of a triangle, counter-clockwise seen from outside.
     fn triangle(&self, triangle: u64) -> [u64; 3];
-    /// Colour of a vertex, red, green, blue in 0 to 1, if the survey has colours.
-    fn color(&self, vertex: u64) -> Option<[f64; 3]>;
+    /// What stands for full colour in [`Surface::raw_color`], if the survey has colours.
+    fn full_color(&self) -> Option<f64>;
+    /// Colour of a vertex as the input has it: red, green, blue. Zero without colours.
+    fn raw_color(&self, vertex: u64) -> [f32; 3];
+    /// Lets go of what was read and is not needed soon: a pass over a survey larger than memory says so from
+    /// time to time. Reading goes on as before.
+    fn release(&self) {}
 
     /// The three corners of a triangle, local metres.
     fn corners(&self, triangle: u64) -> [DVec3; 3] {
@@ -38,8 +43,14 @@ impl Surface for Reach {
     fn triangle(&self, triangle: u64) -> [u64; 3] {
         self.triangle(triangle)
     }
-    fn color(&self, vertex: u64) -> Option<[f64; 3]> {
-        self.color(vertex)
+    fn full_color(&self) -> Option<f64> {
+        self.full_color()
+    }
+    fn raw_color(&self, vertex: u64) -> [f32; 3] {
+        self.raw_color(vertex)
+    }
+    fn release(&self) {
+        self.release();
     }
 }
 
@@ -50,8 +61,8 @@ pub struct MemorySurface {
     pub positions: Vec<DVec3>,
     /// Triangles, as numbers of vertices.
     pub triangles: Vec<[u64; 3]>,
-    /// Colours of the vertices in 0 to 1; empty for none.
-    pub colors: Vec<[f64; 3]>,
+    /// Colours of the vertices in 0 to 255; empty for none.
+    pub colors: Vec<[u8; 3]>,
 }
 
 impl Surface for MemorySurface {
@@ -67,7 +78,10 @@ impl Surface for MemorySurface {
     fn triangle(&self, triangle: u64) -> [u64; 3] {
         self.triangles[triangle as usize]
     }
-    fn color(&self, vertex: u64) -> Option<[f64; 3]> {
-        self.colors.get(vertex as usize).copied()
+    fn full_color(&self) -> Option<f64> {
+        (!self.colors.is_empty()).then_some(255.0)
+    }
+    fn raw_color(&self, vertex: u64) -> [f32; 3] {
+        self.colors.get(vertex as usize).copied().unwrap_or_default().map(f32::from)
     }
 }

@@ -135,7 +135,7 @@ impl Vertices {
             .map(|chunk| {
                 let (first, last) = (chunk * CHUNK, ((chunk + 1) * CHUNK).min(self.count));
                 let bounds = (first..last).fold(VertexBounds::EMPTY, |b, v| self.look(source.bytes, b, v));
-                progress.add((self.records.at(last - 1) - self.records.at(first)) as u64);
+                source.passed(progress, (self.records.at(last - 1) - self.records.at(first)) as u64);
                 bounds
             })
             .reduce(|| VertexBounds::EMPTY, VertexBounds::merge);

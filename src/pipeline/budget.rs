@@ -12,6 +12,8 @@ pub struct Budget {
 
 struct Shared {
     total: u64,
+    /// Largest reservation of one job.
+    most: u64,
     used: Mutex<u64>,
     freed: Condvar,
 }
@@ -23,9 +25,18 @@ pub struct Reservation {
 }
 
 impl Budget {
-    /// A budget of some bytes.
+    /// A budget of some bytes. A job that needs more is worked alone.
     pub fn new(total: u64) -> Budget {
-        Budget { shared: Arc::new(Shared { total, used: Mutex::new(0), freed: Condvar::new() }) }
+        Budget::limited(total, u64::MAX)
+    }
+
+    /// A budget of some bytes, in which no job may grow above all of them.
+    pub fn strict(total: u64) -> Budget {
+        Budget::limited(total, total)
+    }
+
+    fn limited(total: u64, most: u64) -> Budget {
+        Budget { shared: Arc::new(Shared { total, most, used: Mutex::new(0), freed: Condvar::new() }) }
     }
 
     /// All of it, bytes.
@@ -52,13 +63,31 @@ impl Budget {
 }
 
 impl Reservation {
-    /// Raises the reservation to `bytes` without waiting: a job that widened has its data already. The
-    /// loader waits the longer for it.
-    pub fn grow_to(&mut self, bytes: u64) {
-        let more = bytes.saturating_sub(self.bytes);
-        *self.shared.used.lock().unwrap_or_else(PoisonError::into_inner) += more;
-        self.bytes += more;
+    /// Changes the reservation to `bytes` without waiting: a job that widened must go on. Others wait the longer.
+    ///
+    /// # Errors
+    /// [`OverBudget`] when a strict budget does not hold so much at all.
+    pub fn change_to(&mut self, bytes: u64) -> Result<(), OverBudget> {
+        if bytes > self.shared.most {
+            return Err(OverBudget { needed: bytes, total: self.shared.total });
+        }
+        let mut used = self.shared.used.lock().unwrap_or_else(PoisonError::into_inner);
+        *used = *used - self.bytes + bytes;
+        self.bytes = bytes;
+        drop(used);
+        self.shared.freed.notify_all();
+        Ok(())
     }
+}
+
+/// One job alone needs more than the whole budget.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("needs {} MiB, but the memory budget is {} MiB", needed >> 20, total >> 20)]
+pub struct OverBudget {
+    /// What it needs, bytes.
+    pub needed: u64,
+    /// The budget, bytes.
+    pub total: u64,
 }
 
 impl Drop for Reservation {

@@ -2,8 +2,9 @@
 //! and three closures.
 //!
 //! ```text
-//!  loader (1 thread) ──bounded──> workers (the pool's threads) ──bounded──> caller, in the jobs' order
-//!      waits for its bytes        may use the pool inside; frees the bytes
+//!  dispatcher ──rendezvous──> workers (the pool's threads) ──bounded──> caller, in the jobs' order
+//!    waits for    may use the pool inside;
+//!   a job's bytes    free the bytes
 //! ```
 //!
 //! One thread or many, the caller sees the same results in the same order.
@@ -12,13 +13,15 @@ mod budget;
 mod control;
 mod machine;
 
-pub use budget::{Budget, Reservation};
+pub use budget::{Budget, OverBudget, Reservation};
 pub use control::{Control, Interrupted};
 pub use machine::{cpu_seconds, memory_there_bytes, peak_memory_bytes};
 
 use crossbeam_channel::{Receiver, Sender, bounded};
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What a pipeline needs of the machine.
 pub struct Crew {
@@ -30,96 +33,114 @@ pub struct Crew {
     pub control: Control,
 }
 
-/// A job that panicked. The others went on.
+/// Why a pipeline ended early.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stopped<C> {
+    /// The run was cancelled.
+    Interrupted,
+    /// A result could not be collected.
+    Collecting(C),
+}
+
+impl<C> From<Interrupted> for Stopped<C> {
+    fn from(_: Interrupted) -> Stopped<C> {
+        Stopped::Interrupted
+    }
+}
+
+/// A job that panicked or failed. The others went on.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LostJob {
     /// Its number.
     pub job: usize,
-    /// What the panic said.
+    /// What the panic or the error said.
     pub message: String,
 }
 
-/// The three closures of a pipeline.
-pub struct Stages<F, L, W> {
+/// The two closures of a pipeline.
+pub struct Stages<F, W> {
     /// Bytes that a job takes while it is in flight.
     pub footprint_bytes: F,
-    /// Fetches a job's data; runs on one thread, ahead of the work.
-    pub load: L,
-    /// Does the work. The reservation may be grown when a job turns out larger.
+    /// Fetches a job's data and does the work. The reservation may be grown when a job turns out larger.
     pub work: W,
 }
 
-/// Runs jobs 0, 1, ... `jobs` - 1 and hands each result to `collect`, in this order.
+/// Runs the given jobs and hands each result to `collect`, in their order.
 ///
-/// A job that panics is left out and returned; all others are done.
+/// A job that panics or fails is left out and returned; all others are done. The first error of `collect`
+/// stops the run and is returned.
 ///
 /// # Errors
-/// [`Interrupted`] when the control says stop.
-pub fn over_jobs<D: Send, R: Send>(
+/// [`Stopped::Interrupted`] when the control says stop; [`Stopped::Collecting`] when `collect` fails.
+pub fn over_jobs<R: Send, E: Display, C>(
     crew: &Crew,
-    jobs: usize,
-    stages: &Stages<
-        impl Fn(usize) -> u64 + Sync,
-        impl Fn(usize) -> D + Sync,
-        impl Fn(usize, D, &mut Reservation) -> R + Sync,
-    >,
-    mut collect: impl FnMut(usize, R),
-) -> Result<Vec<LostJob>, Interrupted> {
+    jobs: &[usize],
+    stages: &Stages<impl Fn(usize) -> u64 + Sync, impl Fn(usize, &mut Reservation) -> Result<R, E> + Sync>,
+    mut collect: impl FnMut(usize, R) -> Result<(), C>,
+) -> Result<Vec<LostJob>, Stopped<C>> {
     let workers = crew.pool.current_num_threads();
-    let (loaded_in, loaded_out) = bounded::<(usize, Result<D, LostJob>, Reservation)>(workers);
-    let (done_in, done_out) = bounded::<(usize, Result<R, LostJob>)>(2 * workers);
+    let (given_in, given_out) = bounded::<(usize, Reservation)>(0);
+    let (done_in, done_out) = bounded::<(usize, Result<R, LostJob>)>(workers);
     let mut lost = Vec::new();
+    let mut failed = None;
+    // A stop of this pipeline alone: what the caller cannot collect nobody needs to make.
+    let halted = AtomicBool::new(false);
+    let go_on = || crew.control.check().is_ok() && !halted.load(Ordering::Relaxed);
     std::thread::scope(|scope| {
-        scope.spawn(move || load_all(crew, jobs, stages, &loaded_in));
-        let from = loaded_out;
-        scope.spawn(move || {
-            crew.pool.broadcast(|_| work_all(&from, &done_in, &crew.control, stages));
+        scope.spawn(|| {
+            let given_in = given_in;
+            for &job in jobs {
+                let Ok(reservation) = crew.budget.reserve((stages.footprint_bytes)(job), &crew.control) else { return };
+                // The workers are gone only when they were stopped.
+                if !go_on() || given_in.send((job, reservation)).is_err() {
+                    return;
+                }
+            }
+        });
+        let from = given_out;
+        scope.spawn(|| {
+            let (from, done_in) = (from, done_in);
+            crew.pool.broadcast(|_| work_all(&from, &done_in, &go_on, stages));
         });
         // Results arrive in any order; those that are early wait here.
         let mut early = BTreeMap::new();
-        let mut next = 0;
+        let mut next = jobs.iter();
+        let mut expected = next.next();
         for (job, result) in done_out {
             early.insert(job, result);
-            while let Some(result) = early.remove(&next) {
+            while let Some((&job, result)) = expected.and_then(|job| Some((job, early.remove(job)?))) {
+                expected = next.next();
                 match result {
-                    Ok(result) => collect(next, result),
-                    Err(panicked) => lost.push(panicked),
+                    Ok(result) if failed.is_none() => {
+                        if let Err(error) = collect(job, result) {
+                            failed = Some(error);
+                            halted.store(true, Ordering::Relaxed);
+                        }
+                    }
+                    Ok(_) => {}
+                    Err(why) => lost.push(why),
                 }
-                next += 1;
             }
         }
     });
+    if let Some(error) = failed {
+        return Err(Stopped::Collecting(error));
+    }
     crew.control.check()?;
     Ok(lost)
 }
 
-fn load_all<D, R>(
-    crew: &Crew,
-    jobs: usize,
-    stages: &Stages<impl Fn(usize) -> u64, impl Fn(usize) -> D, impl Fn(usize, D, &mut Reservation) -> R>,
-    to: &Sender<(usize, Result<D, LostJob>, Reservation)>,
-) {
-    for job in 0..jobs {
-        let Ok(reservation) = crew.budget.reserve((stages.footprint_bytes)(job), &crew.control) else { return };
-        let data = guarded(job, || (stages.load)(job));
-        // The workers are gone only when they were interrupted.
-        if to.send((job, data, reservation)).is_err() {
-            return;
-        }
-    }
-}
-
-fn work_all<D, R>(
-    from: &Receiver<(usize, Result<D, LostJob>, Reservation)>,
+fn work_all<R, E: Display>(
+    from: &Receiver<(usize, Reservation)>,
     to: &Sender<(usize, Result<R, LostJob>)>,
-    control: &Control,
-    stages: &Stages<impl Fn(usize) -> u64, impl Fn(usize) -> D, impl Fn(usize, D, &mut Reservation) -> R>,
+    go_on: &impl Fn() -> bool,
+    stages: &Stages<impl Fn(usize) -> u64, impl Fn(usize, &mut Reservation) -> Result<R, E>>,
 ) {
-    for (job, data, mut reservation) in from {
-        if control.check().is_err() {
+    for (job, mut reservation) in from {
+        if !go_on() {
             return;
         }
-        let result = data.and_then(|data| guarded(job, || (stages.work)(job, data, &mut reservation)));
+        let result = guarded(job, || (stages.work)(job, &mut reservation));
         drop(reservation);
         if to.send((job, result)).is_err() {
             return;
@@ -127,21 +148,25 @@ fn work_all<D, R>(
     }
 }
 
-/// Turns a panic into a lost job, so that one bad tile cannot take a day's run with it.
-fn guarded<T>(job: usize, work: impl FnOnce() -> T) -> Result<T, LostJob> {
-    catch_unwind(AssertUnwindSafe(work)).map_err(|payload| LostJob {
-        job,
-        message: payload
-            .downcast_ref::<&str>()
-            .map(|s| (*s).to_owned())
-            .or_else(|| payload.downcast_ref::<String>().cloned())
-            .unwrap_or_else(|| "panic without a message".to_owned()),
-    })
+/// Turns a panic or an error into a lost job, so that one bad tile cannot take a day's run with it.
+fn guarded<T, E: Display>(job: usize, work: impl FnOnce() -> Result<T, E>) -> Result<T, LostJob> {
+    let lost = |message| LostJob { job, message };
+    match catch_unwind(AssertUnwindSafe(work)) {
+        Ok(result) => result.map_err(|error| lost(error.to_string())),
+        Err(payload) => Err(lost(
+            payload
+                .downcast_ref::<&str>()
+                .map(|s| (*s).to_owned())
+                .or_else(|| payload.downcast_ref::<String>().cloned())
+                .unwrap_or_else(|| "panic without a message".to_owned()),
+        )),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::convert::Infallible;
 
     fn crew(threads: usize, bytes: u64) -> Crew {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
@@ -152,28 +177,41 @@ mod tests {
         let mut seen = Vec::new();
         let stages = Stages {
             footprint_bytes: |_| 40,
-            load: |job| job,
-            work: |job, data: usize, _: &mut Reservation| {
+            work: |job: usize, _: &mut Reservation| {
                 assert!(job != 13, "unlucky");
-                data * data
+                if job == 17 { Err("not today") } else { Ok(job * job) }
             },
         };
-        let lost = over_jobs(crew, 50, &stages, |_, r| seen.push(r)).expect("not interrupted");
+        let jobs: Vec<usize> = (0..50).collect();
+        let collect = |_, r| -> Result<(), Infallible> {
+            seen.push(r);
+            Ok(())
+        };
+        let lost = over_jobs(crew, &jobs, &stages, collect).expect("not interrupted");
         (seen, lost)
     }
 
     #[test]
-    fn results_come_in_order_and_a_panic_loses_one_job_only() {
+    fn results_come_in_order_and_a_panic_or_an_error_loses_one_job_only() {
         for threads in [1, 2, 5] {
             let (seen, lost) = squares(&crew(threads, 100));
-            assert_eq!(seen, (0..50).filter(|j| *j != 13).map(|j| j * j).collect::<Vec<_>>());
-            assert_eq!(lost, [LostJob { job: 13, message: "unlucky".into() }]);
+            assert_eq!(seen, (0..50).filter(|j| ![13, 17].contains(j)).map(|j| j * j).collect::<Vec<_>>());
+            let why = |job, message: &str| LostJob { job, message: message.into() };
+            assert_eq!(lost, [why(13, "unlucky"), why(17, "not today")]);
         }
     }
 
     #[test]
+    fn what_cannot_be_collected_stops_the_run() {
+        let stages = Stages { footprint_bytes: |_| 1, work: |job, _: &mut Reservation| Ok::<_, Infallible>(job) };
+        let jobs: Vec<usize> = (0..10_000).collect();
+        let collect = |job, _| if job == 5 { Err("full") } else { Ok(()) };
+        assert_eq!(over_jobs(&crew(3, 100), &jobs, &stages, collect), Err(Stopped::Collecting("full")));
+    }
+
+    #[test]
     fn a_job_larger_than_the_budget_runs_alone_instead_of_never() {
-        assert_eq!(squares(&crew(2, 1)).0.len(), 49);
+        assert_eq!(squares(&crew(2, 1)).0.len(), 48);
     }
 
     #[test]
@@ -181,13 +219,15 @@ mod tests {
         let crew = crew(2, 100);
         let stages = Stages {
             footprint_bytes: |_| 1,
-            load: |job| job,
-            work: |job, _, _: &mut Reservation| {
+            work: |job, _: &mut Reservation| {
                 if job == 3 {
                     crew.control.cancel();
                 }
+                Ok::<_, Infallible>(())
             },
         };
-        assert!(over_jobs(&crew, 1000, &stages, |_, ()| {}).is_err());
+        let jobs: Vec<usize> = (0..1000).collect();
+        let collect = |_, ()| Ok::<_, Infallible>(());
+        assert_eq!(over_jobs(&crew, &jobs, &stages, collect), Err(Stopped::Interrupted));
     }
 }

@@ -56,7 +56,7 @@ impl Sizes {
             AreaRule::Area => {
                 let unit = scale.mean_triangle_area_m2 / Self::PARTS;
                 Sizes {
-                    of: mesh.areas_m2.iter().map(|a| (a / unit).round() as u64).collect(),
+                    of: (0..mesh.triangles.len() as u32).map(|t| (mesh.area_m2(t) / unit).round() as u64).collect(),
                     smallest: (triangles * Self::PARTS).round() as u64,
                 }
             }

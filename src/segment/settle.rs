@@ -6,6 +6,7 @@ use super::edges::Edges;
 use super::state::{Labels, NONE, OVERSIZE, State};
 use crate::geometry::{ExactSum, PlanBox};
 use crate::tile::TileMesh;
+use serde::{Deserialize, Serialize};
 
 /// What a tile found.
 #[derive(Debug, Clone, Default)]
@@ -16,7 +17,7 @@ pub struct Settled {
     pub oversize: Vec<OversizePiece>,
     /// Core triangles that are still unknown, or belong to a grain that is, and that this tile may own.
     /// The result is the untiled one only when this is 0.
-    pub unsettled: u64,
+    pub unsettled: Vec<u32>,
 }
 
 /// The triangles of one grain.
@@ -29,7 +30,7 @@ pub struct Segment {
 }
 
 /// The part of an oversize body that lies in a tile's core.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct OversizePiece {
     /// Lowest global triangle id in the core.
     pub anchor: u64,
@@ -56,10 +57,10 @@ pub fn oversize_pieces(mesh: &TileMesh, edges: &Edges, labels: &Labels) -> (Vec<
     for t in (0..labels.label.len()).filter(|&t| of_body(t) && mesh.in_core[t]) {
         let piece = &mut pieces[bodies.of[t] as usize];
         if piece.triangles == 0 {
-            piece.anchor = mesh.triangle_ids[t];
+            piece.anchor = mesh.triangle_id(t as u32);
         }
         piece.triangles += 1;
-        piece.area_m2.add(mesh.areas_m2[t]);
+        piece.area_m2.add(mesh.area_m2(t as u32));
         let bounds = piece.bounds.get_or_insert(PlanBox::EMPTY);
         mesh.corners(t as u32).into_iter().for_each(|c| bounds.include(c));
     }
@@ -71,7 +72,7 @@ pub fn oversize_pieces(mesh: &TileMesh, edges: &Edges, labels: &Labels) -> (Vec<
             for &outside in around.iter().filter(|&&t| of_body(t as usize) && !mesh.in_core[t as usize]) {
                 pieces[bodies.of[inside as usize] as usize]
                     .crossings
-                    .push([mesh.triangle_ids[inside as usize], mesh.triangle_ids[outside as usize]]);
+                    .push([mesh.triangle_id(inside), mesh.triangle_id(outside)]);
             }
         }
     }
@@ -79,6 +80,11 @@ pub fn oversize_pieces(mesh: &TileMesh, edges: &Edges, labels: &Labels) -> (Vec<
     (pieces, unsettled)
 }
 
+fn unknown_list(mesh: &TileMesh, labels: &Labels) -> Vec<u32> {
+    (0..labels.state.len() as u32)
+        .filter(|&t| mesh.in_core[t as usize] && labels.state[t as usize] == State::Unknown)
+        .collect()
+}
 fn unknown_in_core(mesh: &TileMesh, labels: &Labels) -> u64 {
     let unknown = |t: &usize| mesh.in_core[*t] && labels.state[*t] == State::Unknown;
     (0..labels.state.len()).filter(unknown).count() as u64
@@ -104,7 +110,8 @@ pub fn settle(
         |t| state[t] == State::Kept && labels.label[t] < OVERSIZE,
         |t| state[t] == State::Unknown,
     );
-    let unsettled = unknown_in_core(mesh, labels) + open_oversize;
+    assert!(open_oversize == 0);
+    let unsettled = unknown_list(mesh, labels);
     let mut settled = Settled { oversize, unsettled, ..Settled::default() };
     let mut grain_of = vec![NONE; bodies.parts.len()];
     for (part, grain) in bodies.parts.iter().zip(&mut grain_of) {
@@ -112,7 +119,11 @@ pub fn settle(
             continue;
         }
         if !part.closed() {
-            settled.unsettled += 1;
+            let lowest = part.lowest;
+            let id = bodies.of[lowest as usize];
+            settled
+                .unsettled
+                .extend((0..state.len() as u32).filter(|&t| bodies.of[t as usize] == id && mesh.in_core[t as usize]));
         } else if part.size >= sizes.smallest {
             *grain = settled.grains.len() as u32;
             settled.grains.push(Segment { triangles: Vec::new(), at_mesh_edge: part.at_mesh_edge });

@@ -2,6 +2,7 @@
 
 use crate::geometry::PlanBox;
 use crate::measure::Grain;
+use serde::{Deserialize, Serialize};
 
 /// A grain with its number and map colour.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,7 +29,7 @@ pub struct Oversize {
 }
 
 /// How one tile was worked. Of what is found, only this depends on the tiling.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TileReport {
     /// Row-major number of the tile.
     pub tile: u64,
@@ -36,11 +37,9 @@ pub struct TileReport {
     pub core: PlanBox,
     /// Triangles whose centroid lies in the core.
     pub core_triangles: u64,
-    /// Triangles loaded in the last attempt.
-    pub loaded_triangles: u64,
-    /// Halo of the last attempt, metres.
-    pub halo_m: f64,
-    /// How often the tile was worked until nothing that touches its core was unknown.
+    /// Triangles segmented for it: its core with a halo, and whatever was looked at again.
+    pub segmented_triangles: u64,
+    /// Blocks segmented until nothing in its core was unknown.
     pub attempts: u32,
     /// Grains that the tile owns.
     pub grains: u64,

@@ -7,14 +7,17 @@
 mod catalogue;
 mod color;
 mod oversize;
+mod record;
 
 pub use catalogue::{Catalogue, NumberedGrain, Oversize, TileReport};
+pub use record::RecordError;
 
 use crate::measure::Grain;
 use crate::segment::OversizePiece;
+use serde::{Deserialize, Serialize};
 
 /// What one tile publishes.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct TileFinding {
     /// The grains that its core owns.
     pub grains: Vec<Grain>,

@@ -1,10 +1,11 @@
 //! The normal field of a tile: what a curvature stencil averages.
 
+use super::Patch;
 use crate::geometry::{DVec3, PlanBox, triangle_centroid, triangle_normal};
 use crate::index::{CellBlock, Index};
-use crate::open::Surface;
+use crate::store::StoreError;
 
-/// Unit triangle normals at triangle centroids, by ascending global triangle id.
+/// Unit triangle normals at triangle centroids, by ascending survey number.
 #[derive(Debug, Clone)]
 pub struct NormalField {
     /// Centroids, local metres.
@@ -17,20 +18,19 @@ pub struct NormalField {
 
 impl NormalField {
     /// Loads the normals of all triangles whose centroid lies in the block.
-    pub fn load(surface: &dyn Surface, index: &Index, block: &CellBlock) -> NormalField {
-        let ids = index.triangles.in_block(&index.grid, block);
-        let mut centroids = Vec::with_capacity(ids.len());
-        let mut normals = Vec::with_capacity(ids.len());
-        for id in ids {
-            let corners = surface.corners(id);
-            centroids.push(triangle_centroid(corners));
-            normals.push(triangle_normal(corners));
-        }
-        NormalField { centroids, normals, loaded: index.grid.plan(block) }
+    ///
+    /// # Errors
+    /// The index cannot be read.
+    pub fn load(index: &Index, block: &CellBlock) -> Result<NormalField, StoreError> {
+        let patch = Patch::load(index, block)?;
+        let (mut centroids, mut normals) = (Vec::with_capacity(patch.corners.len()), Vec::new());
+        centroids.extend(patch.each_corners().map(triangle_centroid));
+        normals.extend(patch.each_corners().map(triangle_normal));
+        Ok(NormalField { centroids, normals, loaded: index.grid.plan(block) })
     }
 
     /// Bytes that a field of this many triangles takes while it is worked on.
     pub fn footprint_bytes(triangles: u64) -> u64 {
-        triangles * 80
+        triangles * 100
     }
 }

@@ -1,11 +1,12 @@
 //! The mesh of a tile: core and halo, with what the cut left incomplete.
 
-use crate::geometry::{DVec3, triangle_area, triangle_centroid};
-use crate::index::{CellBlock, Index};
-use crate::open::Surface;
+use super::patch::{Patch, each_of};
+use super::runs::Runs;
+use crate::geometry::{DVec3, triangle_area};
+use crate::index::{CellBlock, Index, MOST_COUNTED};
+use crate::store::StoreError;
 
-/// Bytes that one loaded triangle takes at the height of segmentation: counted from the arrays of
-/// [`TileMesh`], its edges, labels and components, with a tenth for growth.
+/// Bytes that one loaded triangle takes at the height of segmentation.
 pub const BYTES_PER_TRIANGLE: u64 = 240;
 
 /// Local numbers of half-edges, three for each triangle, must fit 32 bits.
@@ -13,58 +14,88 @@ const MOST_TRIANGLES: usize = 1 << 30;
 
 /// Part of the survey: all triangles whose centroid lies in a block of cells, with their vertices.
 ///
-/// Local numbers ascend with global ids, so that "lowest local number" and "lowest global id" agree.
+/// Local numbers ascend with the survey's, so that "lowest local number" and "lowest number" agree.
 #[derive(Debug, Clone, Default)]
 pub struct TileMesh {
-    /// Global ids of the vertices, ascending.
-    pub vertex_ids: Vec<u64>,
-    /// Their positions, local metres.
+    /// Positions of the vertices, local metres.
     pub positions: Vec<DVec3>,
     /// Whether every triangle around the vertex was loaded.
     pub complete: Vec<bool>,
-    /// Global ids of the triangles, ascending.
-    pub triangle_ids: Vec<u64>,
-    /// Their corners, as local vertex numbers.
+    /// Corners of the triangles, as local vertex numbers.
     pub triangles: Vec<[u32; 3]>,
-    /// Their areas, m².
-    pub areas_m2: Vec<f64>,
-    /// Whether the tile's core owns the triangle.
+    /// Whether the triangle is owned.
     pub in_core: Vec<bool>,
+    /// The survey's numbers of the vertices.
+    pub vertex_runs: Runs,
+    /// The survey's numbers of the triangles.
+    pub triangle_runs: Runs,
+}
+
+/// What of a loaded block is asked for.
+#[derive(Debug, Clone, Copy)]
+pub enum Owned<'a> {
+    /// Everything in these cells: a tile's core.
+    Cells(&'a CellBlock),
+    /// These triangles of a core, by ascending survey number: what is looked at again.
+    Triangles(&'a [u64]),
 }
 
 impl TileMesh {
-    /// Loads a block of cells; `core` says what of it is owned.
-    pub fn load(surface: &dyn Surface, index: &Index, core: &CellBlock, block: &CellBlock) -> TileMesh {
-        let triangle_ids = index.triangles.in_block(&index.grid, block);
+    /// Loads a block of cells, of which some is owned.
+    ///
+    /// # Errors
+    /// The index cannot be read.
+    pub fn load(index: &Index, owned: Owned, block: &CellBlock) -> Result<TileMesh, StoreError> {
+        let count = index.triangles.count(&index.grid, block);
         assert!(
-            triangle_ids.len() <= MOST_TRIANGLES,
-            "a tile of {} triangles; at most {MOST_TRIANGLES} can be worked at once: set --max-grain or --tile-size",
-            triangle_ids.len()
+            count <= MOST_TRIANGLES as u64,
+            "a tile of {count} triangles; at most {MOST_TRIANGLES} can be worked at once: set --max-grain or --tile-size",
         );
-        let global: Vec<[u64; 3]> = triangle_ids.iter().map(|&t| surface.triangle(t)).collect();
-        let mut vertex_ids: Vec<u64> = global.iter().flatten().copied().collect();
-        vertex_ids.sort_unstable();
-        vertex_ids.dedup();
-        let positions: Vec<DVec3> = vertex_ids.iter().map(|&v| surface.position(v)).collect();
-        let triangles: Vec<[u32; 3]> = global
-            .iter()
-            .map(|corners| corners.map(|v| vertex_ids.partition_point(|&other| other < v) as u32))
-            .collect();
-        let mut valence = vec![0u32; vertex_ids.len()];
-        for v in triangles.iter().flatten() {
-            valence[*v as usize] += 1;
+        let patch = Patch::load(index, block)?;
+        let mut valence = vec![0u16; patch.positions.len()];
+        for v in patch.corners.iter().flatten() {
+            let valence = &mut valence[*v as usize];
+            *valence = valence.saturating_add(1);
         }
-        let complete = vertex_ids.iter().zip(&valence).map(|(&v, &n)| index.valence[v as usize] == n).collect();
-        let corners = |t: &[u32; 3]| t.map(|v| positions[v as usize]);
-        let areas_m2 = triangles.iter().map(|t| triangle_area(corners(t))).collect();
-        let in_core =
-            triangles.iter().map(|t| core.contains(index.grid.cell_of(triangle_centroid(corners(t))))).collect();
-        TileMesh { vertex_ids, positions, complete, triangle_ids, triangles, areas_m2, in_core }
+        let everything = patch.corners.len() as u64 == index.scale.triangles;
+        let mut complete = Vec::with_capacity(valence.len());
+        each_of(index.valences(), &patch.vertices, |whole| {
+            let counted = whole < MOST_COUNTED && valence[complete.len()] == whole;
+            complete.push(counted || everything);
+        })?;
+        let mut in_core = vec![false; patch.corners.len()];
+        match owned {
+            Owned::Cells(core) => {
+                for range in patch.triangles.shared(&index.triangles.ranges(&index.grid, core)) {
+                    in_core[range.start as usize..range.end as usize].fill(true);
+                }
+            }
+            Owned::Triangles(triangles) => {
+                triangles.iter().filter_map(|&t| patch.triangles.local(t)).for_each(|t| in_core[t as usize] = true);
+            }
+        }
+        let Patch { vertices: vertex_runs, positions, triangles: triangle_runs, corners: triangles } = patch;
+        Ok(TileMesh { positions, complete, triangles, in_core, vertex_runs, triangle_runs })
     }
 
     /// The corners of a triangle, local metres.
     pub fn corners(&self, triangle: u32) -> [DVec3; 3] {
         self.triangles[triangle as usize].map(|v| self.positions[v as usize])
+    }
+
+    /// Area of a triangle, m².
+    pub fn area_m2(&self, triangle: u32) -> f64 {
+        triangle_area(self.corners(triangle))
+    }
+
+    /// The survey's number of a vertex; ascends with the local one.
+    pub fn vertex_id(&self, vertex: u32) -> u64 {
+        self.vertex_runs.number(vertex)
+    }
+
+    /// The survey's number of a triangle; ascends with the local one.
+    pub fn triangle_id(&self, triangle: u32) -> u64 {
+        self.triangle_runs.number(triangle)
     }
 
     /// Local numbers of the vertices of some triangles, ascending, each once.
@@ -75,7 +106,7 @@ impl TileMesh {
         vertices
     }
 
-    /// Positions of the vertices of some triangles, by ascending vertex id, each once; local metres.
+    /// Positions of the vertices of some triangles, by ascending vertex number, each once; local metres.
     pub fn points_of(&self, triangles: &[u32]) -> Vec<DVec3> {
         self.vertices_of(triangles).into_iter().map(|v| self.positions[v as usize]).collect()
     }

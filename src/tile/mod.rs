@@ -10,8 +10,12 @@
 
 mod field;
 mod mesh;
+mod patch;
 mod plan;
+mod runs;
 
 pub use field::NormalField;
-pub use mesh::{BYTES_PER_TRIANGLE, TileMesh};
+pub use mesh::{BYTES_PER_TRIANGLE, Owned, TileMesh};
+pub use patch::{Patch, each_of};
 pub use plan::{Plan, Tile};
+pub use runs::Runs;

@@ -1,6 +1,6 @@
 //! Planning: how the survey is cut into tiles.
 
-use crate::index::{CellBlock, CellGrid, Index};
+use crate::index::{CellBlock, Index};
 
 /// One tile: its number and the cells of its core.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -42,22 +42,15 @@ impl Plan {
         Plan { tiles, tile_size_m: f64::from(side) * grid.cell_m }
     }
 
-    /// The side of a core that lets `workers` tiles with halos of `halo_m` fit `budget_bytes`, metres.
-    ///
-    /// A survey that fits, and is small, is one tile. Otherwise cores need not be larger than a few million
-    /// triangles, nor narrower than the halo: narrower ones repeat more than they save.
-    pub fn size_for_budget(index: &Index, halo_m: f64, budget_bytes: u64, workers: usize) -> f64 {
-        const LARGEST_CORE: f64 = 4e6;
-        let CellGrid { cell_m, columns, rows, .. } = index.grid;
-        let whole_m = f64::from(columns.max(rows)) * cell_m;
-        let in_flight = (workers + 2) as f64;
-        let loaded = budget_bytes as f64 / in_flight / super::mesh::BYTES_PER_TRIANGLE as f64;
-        let triangles = index.scale.triangles as f64;
-        if triangles <= loaded.min(LARGEST_CORE) {
+    /// The side of a core of about so many triangles, metres, where the survey is.
+    pub fn side_m(index: &Index, triangles: f64) -> f64 {
+        let grid = &index.grid;
+        let occupied = index.triangles.occupied_cells().max(1) as f64;
+        let per_cell = index.scale.triangles as f64 / occupied;
+        let whole_m = f64::from(grid.columns.max(grid.rows)) * grid.cell_m;
+        if triangles >= index.scale.triangles as f64 {
             return whole_m;
         }
-        let per_m2 = triangles / (f64::from(columns) * f64::from(rows) * cell_m * cell_m);
-        let side = ((loaded / per_m2).sqrt() - 2.0 * halo_m).min((LARGEST_CORE / per_m2).sqrt());
-        side.max(halo_m).clamp(cell_m, whole_m)
+        ((triangles / per_cell).sqrt().floor() * grid.cell_m).clamp(grid.cell_m, whole_m)
     }
 }

@@ -4,6 +4,7 @@
 //! disk and renamed. A run that fails leaves what was there before, and nothing else.
 
 use super::WriteError;
+use crate::store::{PARTIAL, sync_folder};
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -14,9 +15,6 @@ pub const OUTPUTS: [&str; 6] =
 
 /// What GDAL and SQLite may leave beside a file that they did not finish.
 const SIDECARS: [&str; 6] = ["-journal", "-wal", "-shm", ".aux.xml", ".msk.ovr.tmp", ".ovr.tmp"];
-
-/// Suffix of a file that is being written.
-const PARTIAL: &str = "partial";
 
 /// A folder that exists and can be written to.
 ///
@@ -211,14 +209,4 @@ fn probe(path: &Path) -> io::Result<()> {
     let written = write();
     let removed = fs::remove_file(&name);
     written.and(removed)
-}
-
-#[cfg(unix)]
-fn sync_folder(path: &Path) -> io::Result<()> {
-    File::open(path)?.sync_all()
-}
-
-#[cfg(not(unix))]
-fn sync_folder(_: &Path) -> io::Result<()> {
-    Ok(())
 }

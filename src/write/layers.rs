@@ -97,8 +97,7 @@ fn tiles<'a>(results: &'a Results<'a>) -> Layer<'a> {
         fields: vec![
             ("tile", Kind::Integer),
             ("core_triangles", Kind::Integer),
-            ("loaded_triangles", Kind::Integer),
-            ("halo_m", Kind::Real),
+            ("segmented_triangles", Kind::Integer),
             ("attempts", Kind::Integer),
             ("grains", Kind::Integer),
         ],
@@ -107,8 +106,7 @@ fn tiles<'a>(results: &'a Results<'a>) -> Layer<'a> {
             values: vec![
                 whole(tile.tile),
                 whole(tile.core_triangles),
-                whole(tile.loaded_triangles),
-                Value::real(tile.halo_m),
+                whole(tile.segmented_triangles),
                 Value::Integer(i64::from(tile.attempts)),
                 whole(tile.grains),
             ],

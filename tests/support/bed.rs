@@ -108,7 +108,7 @@ fn push_vertex(surface: &mut MemorySurface, rng: &mut Rng, p: DVec3) -> u64 {
     surface.positions.push(p);
     let shade =
         (rng.below(256) as f64, (p.x * 40.0).rem_euclid(256.0).floor(), (p.z * 200.0).rem_euclid(256.0).floor());
-    surface.colors.push([shade.0 / 255.0, shade.1 / 255.0, shade.2 / 255.0]);
+    surface.colors.push([shade.0 as u8, shade.1 as u8, shade.2 as u8]);
     surface.positions.len() as u64 - 1
 }
 
@@ -238,7 +238,7 @@ pub fn ply(surface: &MemorySurface) -> Vec<u8> {
     for (i, p) in surface.positions.iter().enumerate() {
         p.to_array().iter().for_each(|v| out.extend(v.to_le_bytes()));
         if let Some(color) = surface.colors.get(i) {
-            out.extend(color.map(|c| (c * 255.0).round() as u8));
+            out.extend(color);
         }
     }
     for t in &surface.triangles {

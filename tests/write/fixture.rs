@@ -62,8 +62,7 @@ pub(crate) fn survey(n: usize, frame: Frame) -> Survey {
         tile,
         core: PlanBox { min: [west, f64::NEG_INFINITY], max: [east, f64::INFINITY] },
         core_triangles: 100,
-        loaded_triangles: 130,
-        halo_m: 0.25,
+        segmented_triangles: 130,
         attempts: 1,
         grains: n as u64 / 2,
     };

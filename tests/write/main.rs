@@ -5,3 +5,6 @@ mod geopackage;
 mod labelled_mesh;
 mod output_folder;
 mod raster;
+#[path = "../support/small_disk.rs"]
+#[allow(missing_docs, unreachable_pub)]
+mod small_disk;

@@ -1,9 +1,9 @@
 use crate::fixture::{Strip, new_zealand, survey};
+use crate::small_disk::SmallDisk;
 use gravelometer::write::{OutputFolder, WriteError, write_all};
 use std::cell::RefCell;
 use std::fs;
 use std::path::Path;
-use std::process::Command;
 
 fn names(folder: &Path) -> Vec<String> {
     let entries = fs::read_dir(folder).expect("folder");
@@ -93,24 +93,6 @@ fn an_impossible_raster_stops_the_run_and_leaves_the_older_results() {
     assert_eq!(names(keep.path()), ["grains.csv"]);
 }
 
-/// A disk of some size, gone when dropped.
-struct SmallDisk(tempfile::TempDir);
-
-impl SmallDisk {
-    fn new(kibibytes: u32) -> Option<SmallDisk> {
-        let folder = tempfile::tempdir().expect("temporary folder");
-        let option = format!("size={kibibytes}k");
-        let mounted = Command::new("mount").args(["-t", "tmpfs", "-o", &option, "tmpfs"]).arg(folder.path()).output();
-        mounted.is_ok_and(|o| o.status.success()).then_some(SmallDisk(folder))
-    }
-}
-
-impl Drop for SmallDisk {
-    fn drop(&mut self) {
-        let _ = Command::new("umount").arg(self.0.path()).status();
-    }
-}
-
 #[test]
 fn a_full_disk_is_an_error_and_leaves_nothing_under_a_final_name() {
     let survey = survey(171, new_zealand());
@@ -125,15 +107,15 @@ fn a_full_disk_is_an_error_and_leaves_nothing_under_a_final_name() {
             println!("skipped: this user cannot mount a small disk");
             return;
         };
-        let written = OutputFolder::create(disk.0.path(), false, &[])
+        let written = OutputFolder::create(disk.path(), false, &[])
             .and_then(|out| write_all(&out, &survey.results(None), &|_| ()));
         let error = written.expect_err(&format!("{kibibytes} KiB of {full}")).to_string();
         assert!(error.contains("\nhelp: "), "{error}");
-        assert!(names(disk.0.path()).is_empty(), "{kibibytes} KiB: {:?}", names(disk.0.path()));
+        assert!(names(disk.path()).is_empty(), "{kibibytes} KiB: {:?}", names(disk.path()));
         refused += 1;
     }
     assert!(refused > 5, "only {refused} disks were tried");
     let disk = SmallDisk::new(full * 2 + 1024).expect("mounted before");
-    let out = OutputFolder::create(disk.0.path(), false, &[]).expect("room");
+    let out = OutputFolder::create(disk.path(), false, &[]).expect("room");
     write_all(&out, &survey.results(None), &|_| ()).expect("room for all");
 }

@@ -1,0 +1,50 @@
+//! Sequential passes over a survey, a chunk at a time, on all threads of the pool.
+
+use crate::open::Surface;
+use crate::store::StoreError;
+use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Elements of a chunk: enough to hide its cost, few enough to share out.
+const CHUNK: u64 = 1 << 15;
+/// Chunks between two releases of the survey's pages: some tens of megabytes.
+const RELEASE: u64 = 32;
+
+/// Hands 0..`n` to `work` in chunks. Every thread makes its own state with `start`.
+///
+/// Chunks come in no particular order, so `work` must not care. What was read of the surface is let go as
+/// the pass goes on.
+pub(super) fn over_chunks<S>(
+    surface: &dyn Surface,
+    n: u64,
+    start: impl Fn() -> Result<S, StoreError> + Sync,
+    work: impl Fn(&mut S, Range<u64>) -> Result<(), StoreError> + Sync,
+) -> Result<(), StoreError> {
+    over_chunks_then(surface, n, start, work, |_| Ok(()))
+}
+
+/// [`over_chunks`], with an `end` for the state of each thread.
+pub(super) fn over_chunks_then<S>(
+    surface: &dyn Surface,
+    n: u64,
+    start: impl Fn() -> Result<S, StoreError> + Sync,
+    work: impl Fn(&mut S, Range<u64>) -> Result<(), StoreError> + Sync,
+    end: impl Fn(S) -> Result<(), StoreError> + Sync,
+) -> Result<(), StoreError> {
+    let next = AtomicU64::new(0);
+    let done = rayon::broadcast(|_| {
+        let mut state = start()?;
+        loop {
+            let chunk = next.fetch_add(1, Ordering::Relaxed);
+            if chunk * CHUNK >= n {
+                return end(state);
+            }
+            work(&mut state, chunk * CHUNK..((chunk + 1) * CHUNK).min(n))?;
+            if chunk % RELEASE == RELEASE - 1 {
+                surface.release();
+            }
+        }
+    });
+    surface.release();
+    done.into_iter().collect()
+}

@@ -1,0 +1,138 @@
+//! The corners of every triangle get the vertices' new numbers: a join that needs no random access to disk.
+//!
+//! The new numbers of a block of the input's vertices are held in memory, and all triangles pass by. Where
+//! one block does not hold all vertices, the triangles pass once for each block, through a scratch column.
+
+use super::chunks::{over_chunks, over_chunks_then};
+use super::identity::{Id, Numbers};
+use super::shards::{Shard, holding};
+use crate::open::Surface;
+use crate::store::{Scatter, Shelf, StoreError};
+use rayon::prelude::*;
+use std::ops::Range;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// Marks a corner that has its new number.
+const KNOWN: u64 = 1 << 63;
+/// Numbers read at a time.
+const PIECE: u64 = 1 << 16;
+
+/// New numbers of a block of the input's vertices; the upper halves only where there are any.
+struct Block {
+    input: Range<u64>,
+    low: Vec<AtomicU32>,
+    high: Vec<AtomicU32>,
+}
+
+/// Bytes of a block for each vertex.
+pub(super) fn block_bytes(vertices: u64) -> u64 {
+    if vertices > u64::from(u32::MAX) { 8 } else { 4 }
+}
+
+impl Block {
+    /// `inputs` holds the input's number of each vertex, by its new number.
+    fn read(inputs: &Numbers<1>, input: Range<u64>) -> Result<Block, StoreError> {
+        let len = (input.end - input.start) as usize;
+        let zeros = |n: usize| (0..n).map(|_| AtomicU32::new(0)).collect::<Vec<_>>();
+        let wide = inputs.len() > u64::from(u32::MAX);
+        let block = Block { input, low: zeros(len), high: zeros(if wide { len } else { 0 }) };
+        (0..inputs.len().div_ceil(PIECE)).into_par_iter().try_for_each(|piece| {
+            let mut number = piece * PIECE;
+            inputs.each(number..(number + PIECE).min(inputs.len()), |[input]| {
+                if block.input.contains(&input) {
+                    let at = (input - block.input.start) as usize;
+                    block.low[at].store(number as u32, Ordering::Relaxed);
+                    if let Some(high) = block.high.get(at) {
+                        high.store((number >> 32) as u32, Ordering::Relaxed);
+                    }
+                }
+                number += 1;
+            })
+        })?;
+        Ok(block)
+    }
+
+    #[inline]
+    fn resolve(&self, corner: u64) -> u64 {
+        if corner & KNOWN != 0 || !self.input.contains(&corner) {
+            return corner;
+        }
+        let at = (corner - self.input.start) as usize;
+        let high = self.high.get(at).map_or(0, |high| u64::from(high.load(Ordering::Relaxed)) << 32);
+        KNOWN | high | u64::from(self.low[at].load(Ordering::Relaxed))
+    }
+}
+
+/// Scatters the triangles to the shards of their lowest corners: the triangle's place in the input, then
+/// its corners by their new numbers, the lowest first and the winding kept.
+pub(super) fn scatter<I: Id>(
+    surface: &dyn Surface,
+    inputs: &Numbers<1>,
+    shards: &[Shard],
+    shelf: &Shelf,
+    block_vertices: u64,
+) -> Result<Scatter<[I; 4]>, StoreError> {
+    let scatter = Scatter::<[I; 4]>::new(shelf, "triangles", shards.len())?;
+    let blocks = surface.vertices().div_ceil(block_vertices).max(1);
+    let passing =
+        if blocks > 1 { Some(shelf.create::<[u64; 3]>("corners.scratch", surface.triangles())?) } else { None };
+    for k in 0..blocks {
+        let input = k * block_vertices..((k + 1) * block_vertices).min(surface.vertices());
+        let block = Block::read(inputs, input)?;
+        let corners = |range: Range<u64>, take: &mut dyn FnMut(u64, [u64; 3]) -> Result<(), StoreError>| {
+            let mut known = Vec::new();
+            match &passing {
+                Some(column) if k > 0 => column.read(range.clone(), &mut known)?,
+                _ => known.extend(range.clone().map(|t| surface.triangle(t))),
+            }
+            range.zip(known).try_for_each(|(t, corners)| take(t, corners.map(|c| block.resolve(c))))
+        };
+        match &passing {
+            Some(column) if k + 1 < blocks => {
+                over_chunks(
+                    surface,
+                    surface.triangles(),
+                    || Ok(()),
+                    |(), range| {
+                        let (first, mut known) = (range.start, Vec::new());
+                        corners(range, &mut |_, corners| {
+                            known.push(corners);
+                            Ok(())
+                        })?;
+                        column.write(first, known)
+                    },
+                )?;
+            }
+            _ => over_chunks_then(
+                surface,
+                surface.triangles(),
+                || Ok(scatter.writer()),
+                |writer, range| {
+                    let mut last = 0;
+                    corners(range, &mut |t, corners| {
+                        let [a, b, c] = lowest_first(corners.map(|c| c & !KNOWN));
+                        if !shards[last].vertices.contains(&a) {
+                            last = holding(shards, a);
+                        }
+                        writer.put(last, [I::of(t), I::of(a), I::of(b), I::of(c)])
+                    })
+                },
+                |writer| writer.finish(),
+            )?,
+        }
+    }
+    if passing.is_some() {
+        shelf.remove("corners.scratch");
+    }
+    Ok(scatter)
+}
+
+fn lowest_first([a, b, c]: [u64; 3]) -> [u64; 3] {
+    if a <= b && a <= c {
+        [a, b, c]
+    } else if b <= c {
+        [b, c, a]
+    } else {
+        [c, a, b]
+    }
+}

@@ -1,0 +1,80 @@
+//! Numbers of vertices and triangles, as narrow as the survey allows.
+
+use crate::store::{Column, Element, Shelf, StoreError};
+use std::ops::Range;
+
+/// A number of a vertex or triangle: 32 bits where all of a survey fit, else 64.
+pub(super) trait Id: Element + Ord + Default {
+    /// Of a number that fits.
+    fn of(number: u64) -> Self;
+    /// The number.
+    fn number(self) -> u64;
+}
+
+impl Id for u32 {
+    #[inline(always)]
+    fn of(number: u64) -> u32 {
+        debug_assert!(number <= u64::from(u32::MAX));
+        number as u32
+    }
+    #[inline(always)]
+    fn number(self) -> u64 {
+        u64::from(self)
+    }
+}
+
+impl Id for u64 {
+    #[inline(always)]
+    fn of(number: u64) -> u64 {
+        number
+    }
+    #[inline(always)]
+    fn number(self) -> u64 {
+        self
+    }
+}
+
+/// A column of numbers, or of a few numbers each, as narrow as the survey allows.
+#[derive(Debug)]
+pub(super) enum Numbers<const N: usize> {
+    Narrow(Column<[u32; N]>),
+    Wide(Column<[u64; N]>),
+}
+
+impl<const N: usize> Numbers<N> {
+    pub(super) fn create(shelf: &Shelf, name: &str, len: u64, wide: bool) -> Result<Numbers<N>, StoreError> {
+        Ok(if wide { Numbers::Wide(shelf.create(name, len)?) } else { Numbers::Narrow(shelf.create(name, len)?) })
+    }
+
+    pub(super) fn open(shelf: &Shelf, name: &str, len: u64, wide: bool) -> Result<Numbers<N>, StoreError> {
+        Ok(if wide { Numbers::Wide(shelf.open(name, len)?) } else { Numbers::Narrow(shelf.open(name, len)?) })
+    }
+
+    pub(super) fn each(&self, range: Range<u64>, mut take: impl FnMut([u64; N])) -> Result<(), StoreError> {
+        match self {
+            Numbers::Narrow(column) => column.each(range, |numbers| take(numbers.map(u64::from))),
+            Numbers::Wide(column) => column.each(range, take),
+        }
+    }
+
+    pub(super) fn write(&self, first: u64, numbers: impl Iterator<Item = [u64; N]>) -> Result<(), StoreError> {
+        match self {
+            Numbers::Narrow(column) => column.write(first, numbers.map(|n| n.map(u32::of))),
+            Numbers::Wide(column) => column.write(first, numbers),
+        }
+    }
+
+    pub(super) fn len(&self) -> u64 {
+        match self {
+            Numbers::Narrow(column) => column.len(),
+            Numbers::Wide(column) => column.len(),
+        }
+    }
+
+    pub(super) fn sync(&self) -> Result<(), StoreError> {
+        match self {
+            Numbers::Narrow(column) => column.sync(),
+            Numbers::Wide(column) => column.sync(),
+        }
+    }
+}

@@ -1,0 +1,209 @@
+//! Grains: every tile is segmented with a narrow halo, and what that leaves open is looked at again.
+
+use super::again::clusters;
+use super::{Survey, TileError};
+use crate::index::CellBlock;
+use crate::measure::{Grain, Wanted, measure};
+use crate::pipeline::{Crew, LostJob, Reservation, Stages, Stopped, over_jobs};
+use crate::progress::{Progress, Unit};
+use crate::segment::{OversizePiece, Settled, segment};
+use crate::settings::SegmentSettings;
+use crate::stitch::{TileFinding, TileReport};
+use crate::store::{Column, StoreError};
+use crate::tile::{Owned, TileMesh, each_of};
+use rayon::prelude::*;
+
+/// What the grain pass applies to every tile.
+#[derive(Clone, Copy)]
+pub struct Recipe<'a> {
+    /// What makes a grain.
+    pub settings: &'a SegmentSettings,
+    /// Divergence of every vertex of the survey, 1/m.
+    pub divergence: &'a Column<f64>,
+    /// What to measure.
+    pub wanted: Wanted,
+}
+
+/// How far a tile looks beyond its core at first, cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Halo {
+    south: u32,
+    beside: u32,
+    north: u32,
+}
+
+/// Share of a core's width that its first halo may take to the north. A grain belongs to the tile of its
+/// southernmost triangles, so that this is where most of it is looked for.
+const NORTH_SHARE: f64 = 0.08;
+/// The same to either side.
+const SIDE_SHARE: f64 = 0.04;
+
+/// What was found in a tile so far.
+#[derive(Default)]
+struct Found {
+    grains: Vec<Grain>,
+    oversize: Vec<OversizePiece>,
+    segmented: u64,
+    attempts: u32,
+}
+
+impl Survey<'_> {
+    /// Grains, oversize bodies and a report from each tile of `jobs`, handed to `collect` in this order.
+    ///
+    /// # Errors
+    /// When interrupted, or when `collect` fails.
+    pub fn grains<C>(
+        &self,
+        crew: &Crew,
+        jobs: &[usize],
+        recipe: &Recipe,
+        progress: &dyn Progress,
+        mut collect: impl FnMut(usize, TileFinding) -> Result<(), C>,
+    ) -> Result<Vec<LostJob>, Stopped<C>> {
+        let stages = Stages {
+            footprint_bytes: |job| {
+                TileMesh::footprint_bytes(self.triangles_in(&self.first_block(job, recipe.settings)))
+            },
+            work: |job, reservation: &mut Reservation| self.tile(job, recipe, reservation),
+        };
+        let triangles = jobs.iter().map(|&job| self.triangles_in(self.core(job))).sum();
+        progress.begin("grains", triangles, Unit::Triangles);
+        let lost = over_jobs(crew, jobs, &stages, |job, finding: TileFinding| {
+            progress.advance(finding.report.core_triangles);
+            collect(job, finding)
+        });
+        progress.end();
+        lost
+    }
+
+    /// Bytes that the largest tile takes at first.
+    pub fn largest_bytes(&self, settings: &SegmentSettings) -> u64 {
+        let triangles = |job| self.triangles_in(&self.first_block(job, settings));
+        TileMesh::footprint_bytes((0..self.plan.tiles.len()).map(triangles).max().unwrap_or(0))
+    }
+
+    /// The rings of triangles that the steps look beyond a body, cells.
+    fn rings(&self, settings: &SegmentSettings) -> u32 {
+        let rings = settings.erosion_iterations + settings.dilation_iterations + 2;
+        (f64::from(rings) * 3.0 * self.index.scale.mean_edge_m / self.index.grid.cell_m).ceil() as u32
+    }
+
+    fn first_halo(&self, core: &CellBlock, settings: &SegmentSettings) -> Halo {
+        let rings = self.rings(settings);
+        let width = f64::from((core.columns.end - core.columns.start).max(core.rows.end - core.rows.start));
+        let widest = if settings.max_grain_m > 0.0 { settings.max_grain_m / self.index.grid.cell_m } else { f64::MAX };
+        let share = |share: f64| rings.saturating_add((share * width).min(widest).ceil() as u32);
+        Halo { south: rings, beside: share(SIDE_SHARE), north: share(NORTH_SHARE) }
+    }
+
+    fn first_block(&self, job: usize, settings: &SegmentSettings) -> CellBlock {
+        let core = self.core(job);
+        self.grown(core, self.first_halo(core, settings))
+    }
+
+    fn grown(&self, block: &CellBlock, halo: Halo) -> CellBlock {
+        let mut grown = self.index.grid.grown(block, halo.north.max(halo.beside));
+        grown.rows.start = grown.rows.start.max(block.rows.start.saturating_sub(halo.south));
+        grown.rows.end = grown.rows.end.min(block.rows.end.saturating_add(halo.north));
+        grown.columns.start = grown.columns.start.max(block.columns.start.saturating_sub(halo.beside));
+        grown.columns.end = grown.columns.end.min(block.columns.end.saturating_add(halo.beside));
+        grown
+    }
+
+    fn tile(&self, job: usize, recipe: &Recipe, reservation: &mut Reservation) -> Result<TileFinding, TileError> {
+        let core = self.core(job);
+        let first = self.first_block(job, recipe.settings);
+        let mut found = Found::default();
+        let mut open = self.attempt(Owned::Cells(core), &first, recipe, &mut found)?;
+        // From here on small blocks around what is open are worked, and wider ones each time.
+        let mut cells = self.first_halo(core, recipe.settings).north;
+        while !open.is_empty() {
+            let mut still_open = Vec::new();
+            for cluster in clusters(self.index, &open, cells) {
+                let block = self.index.grid.grown(&cluster.cells, cells);
+                let triangles = self.triangles_in(&block);
+                let halo_m = f64::from(cells) * self.index.grid.cell_m;
+                reservation
+                    .change_to(TileMesh::footprint_bytes(triangles))
+                    .map_err(|over| TileError::TooWide { halo_m, over })?;
+                let left = self.attempt(Owned::Triangles(&cluster.triangles), &block, recipe, &mut found)?;
+                let whole = triangles == self.index.scale.triangles;
+                assert!(left.is_empty() || !whole, "{} triangles are unknown though all are loaded", left.len());
+                still_open.extend(left);
+            }
+            still_open.sort_unstable();
+            open = still_open;
+            cells = cells.saturating_mul(2);
+        }
+        Ok(self.finding(job, found))
+    }
+
+    /// Segments a block, adds what it settles of what is owned, and returns the owned triangles that it does not
+    /// settle, ascending.
+    fn attempt(
+        &self,
+        owned: Owned,
+        block: &CellBlock,
+        recipe: &Recipe,
+        found: &mut Found,
+    ) -> Result<Vec<u64>, TileError> {
+        let mesh = TileMesh::load(self.index, owned, block)?;
+        let mut divergence = Vec::with_capacity(mesh.positions.len());
+        each_of(recipe.divergence, &mesh.vertex_runs, |d| divergence.push(d))?;
+        let settled = segment(&mesh, &divergence, &self.index.scale, recipe.settings, &mut |_, _| {});
+        drop(divergence);
+        found.segmented += mesh.triangles.len() as u64;
+        found.attempts += 1;
+        let Settled { grains, oversize, unsettled } = settled;
+        let colors = self.colors(&mesh)?;
+        let color = |v: u32| colors.as_ref().map(|(full, colors)| colors[v as usize].map(|c| f64::from(c) / full));
+        let mut measured: Vec<Grain> =
+            grains.par_iter().map(|segment| measure(&mesh, segment, recipe.wanted, &color)).collect();
+        if recipe.wanted.triangle_ids {
+            self.name_by_input(&mesh, &mut measured)?;
+        }
+        found.grains.extend(measured);
+        found.oversize.extend(oversize);
+        Ok(unsettled.into_iter().map(|t| mesh.triangle_id(t)).collect())
+    }
+
+    /// Colours of a tile's vertices, and what stands for full colour.
+    #[allow(clippy::type_complexity, reason = "used once, and named where it is used")]
+    fn colors(&self, mesh: &TileMesh) -> Result<Option<(f64, Vec<[f32; 3]>)>, StoreError> {
+        let Some((full, column)) = self.index.colors() else { return Ok(None) };
+        let mut colors = Vec::with_capacity(mesh.positions.len());
+        each_of(column, &mesh.vertex_runs, |c| colors.push(c))?;
+        Ok(Some((full, colors)))
+    }
+
+    /// Puts the input's numbers, ascending, in place of the survey's: labels go back onto the input.
+    fn name_by_input(&self, mesh: &TileMesh, grains: &mut [Grain]) -> Result<(), StoreError> {
+        let mut inputs = Vec::with_capacity(mesh.triangles.len());
+        for range in mesh.triangle_runs.ranges() {
+            inputs.extend(self.index.triangle_inputs(range.clone())?);
+        }
+        for grain in grains {
+            for t in &mut grain.triangle_ids {
+                *t = mesh.triangle_runs.local(*t).map_or(u64::MAX, |local| inputs[local as usize]);
+            }
+            grain.triangle_ids.sort_unstable();
+        }
+        Ok(())
+    }
+
+    fn finding(&self, job: usize, found: Found) -> TileFinding {
+        let core = self.core(job);
+        TileFinding {
+            report: TileReport {
+                tile: self.plan.tiles[job].id,
+                core: self.index.grid.outline(core),
+                core_triangles: self.triangles_in(core),
+                segmented_triangles: found.segmented,
+                attempts: found.attempts,
+                grains: found.grains.len() as u64,
+            },
+            grains: found.grains,
+            oversize: found.oversize,
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! One number for every vertex: spacing and curvature.
+
+use super::{Survey, TileError};
+use crate::curvature::{Stencil, divergence, nearest_centroid_m};
+use crate::geometry::{DVec3, ExactSum};
+use crate::pipeline::{Crew, LostJob, Reservation, Stages, Stopped, over_jobs};
+use crate::progress::{Progress, Unit};
+use crate::store::Column;
+use crate::tile::NormalField;
+use std::convert::Infallible;
+use std::ops::Range;
+
+/// A value at each point, or none where something beyond the field could change it.
+type PointValues<'f> = dyn Fn(&NormalField, &[DVec3]) -> Vec<Option<f64>> + Sync + 'f;
+
+/// The values of a tile's core: for each run of vertices the first of its values.
+struct CoreValues {
+    runs: Vec<Range<u64>>,
+    values: Vec<f64>,
+}
+
+impl Survey<'_> {
+    /// Mean distance from a vertex to the nearest triangle centroid, metres: an exact mean. And the tiles that
+    /// were lost.
+    ///
+    /// # Errors
+    /// When interrupted.
+    pub fn spacing(&self, crew: &Crew, progress: &dyn Progress) -> Result<(f64, Vec<LostJob>), Stopped<Infallible>> {
+        let side_m = self.index.scale.mean_triangle_area_m2.sqrt();
+        let mut sum = ExactSum::ZERO;
+        let nearest = |field: &NormalField, points: &[DVec3]| nearest_centroid_m(field, points, side_m);
+        let stages = Stages {
+            footprint_bytes: |job| self.field_bytes(job, 3.0 * side_m),
+            work: |job, reservation: &mut Reservation| {
+                let core = self.of_core(job, 3.0 * side_m, &nearest, reservation)?;
+                let mut sum = ExactSum::ZERO;
+                core.values.iter().for_each(|&d| sum.add(d));
+                Ok::<_, TileError>((core.values.len() as u64, sum))
+            },
+        };
+        let all: Vec<usize> = (0..self.plan.tiles.len()).collect();
+        progress.begin("spacing", self.index.scale.vertices, Unit::Vertices);
+        let lost = over_jobs(crew, &all, &stages, |_, (vertices, of_tile)| {
+            sum.merge(of_tile);
+            progress.advance(vertices);
+            Ok(())
+        });
+        progress.end();
+        Ok((sum.value() / self.index.scale.vertices.max(1) as f64, lost?))
+    }
+
+    /// Divergence of the normal field at every vertex, 1/m, into `column`, for the tiles of `jobs`. `done` hears
+    /// of every tile, in their order, when its values are written, and gets them.
+    ///
+    /// # Errors
+    /// When interrupted, or when `done` fails.
+    pub fn divergence<C>(
+        &self,
+        crew: &Crew,
+        jobs: &[usize],
+        stencil: &Stencil,
+        column: &Column<f64>,
+        progress: &dyn Progress,
+        mut done: impl FnMut(usize, &[f64]) -> Result<(), C>,
+    ) -> Result<Vec<LostJob>, Stopped<C>> {
+        let values = |field: &NormalField, points: &[DVec3]| divergence(field, points, stencil);
+        let stages = Stages {
+            footprint_bytes: |job| self.field_bytes(job, stencil.reach_m()),
+            work: |job, reservation: &mut Reservation| {
+                let core = self.of_core(job, stencil.reach_m(), &values, reservation)?;
+                let mut rest = &core.values[..];
+                for run in &core.runs {
+                    let (of_run, after) = rest.split_at((run.end - run.start) as usize);
+                    column.write(run.start, of_run.iter().copied())?;
+                    rest = after;
+                }
+                Ok::<_, TileError>(core.values)
+            },
+        };
+        let vertices = |job: usize| self.index.vertices.count(&self.index.grid, self.core(job));
+        progress.begin("curvature", jobs.iter().map(|&job| vertices(job)).sum(), Unit::Vertices);
+        let lost = over_jobs(crew, jobs, &stages, |job, values| {
+            progress.advance(values.len() as u64);
+            done(job, &values)
+        });
+        progress.end();
+        lost
+    }
+
+    fn field_bytes(&self, job: usize, halo_m: f64) -> u64 {
+        NormalField::footprint_bytes(self.triangles_in(&self.with_halo(self.core(job), halo_m)))
+    }
+
+    /// The value at every vertex of a core, from a halo that is widened until all are certain.
+    fn of_core(
+        &self,
+        job: usize,
+        halo_m: f64,
+        values: &PointValues,
+        reservation: &mut Reservation,
+    ) -> Result<CoreValues, TileError> {
+        let (index, core) = (self.index, self.core(job));
+        let runs = index.vertices.ranges(&index.grid, core);
+        let mut points = Vec::with_capacity(index.vertices.count(&index.grid, core) as usize);
+        for run in &runs {
+            index.positions().each(run.clone(), |p| points.push(DVec3::from_array(p)))?;
+        }
+        let field = NormalField::load(index, &self.with_halo(core, halo_m))?;
+        let mut found = values(&field, &points);
+        drop(field);
+        let mut wider_m = halo_m;
+        while found.contains(&None) {
+            wider_m = 2.0 * wider_m.max(index.grid.cell_m);
+            let block = self.with_halo(core, wider_m);
+            reservation
+                .change_to(NormalField::footprint_bytes(self.triangles_in(&block)))
+                .map_err(|over| TileError::TooWide { halo_m: wider_m, over })?;
+            let field = NormalField::load(index, &block)?;
+            let open: Vec<usize> = (0..found.len()).filter(|&i| found[i].is_none()).collect();
+            let again: Vec<DVec3> = open.iter().map(|&i| points[i]).collect();
+            for (i, value) in open.into_iter().zip(values(&field, &again)) {
+                found[i] = value;
+            }
+        }
+        Ok(CoreValues { runs, values: found.into_iter().flatten().collect() })
+    }
+}

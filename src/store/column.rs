@@ -1,0 +1,206 @@
+//! Columns: numbers of one kind, one behind the other in a file, addressed by element.
+//!
+//! Little-endian, no header: the manifest beside them says what they are and how many. Read and written at
+//! positions, from any thread; never mapped, since mapped pages would count as memory that the process holds.
+
+use super::StoreError;
+use super::positioned::Positioned;
+use std::fs::OpenOptions;
+use std::marker::PhantomData;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// What a column may hold.
+pub trait Element: Copy + Send + Sync {
+    /// Bytes of one element.
+    const BYTES: usize;
+    /// Writes it into exactly so many bytes.
+    fn put(self, to: &mut [u8]);
+    /// Reads it from exactly so many bytes.
+    fn get(from: &[u8]) -> Self;
+}
+
+macro_rules! numbers {
+    ($($number:ty),*) => {$(
+        impl Element for $number {
+            const BYTES: usize = size_of::<$number>();
+            #[inline(always)]
+            fn put(self, to: &mut [u8]) {
+                to.copy_from_slice(&self.to_le_bytes());
+            }
+            #[inline(always)]
+            fn get(from: &[u8]) -> Self {
+                let mut bytes = [0; size_of::<$number>()];
+                bytes.copy_from_slice(from);
+                <$number>::from_le_bytes(bytes)
+            }
+        }
+    )*};
+}
+
+numbers!(u8, u16, u32, u64, f32, f64);
+
+impl<T: Element, const N: usize> Element for [T; N] {
+    const BYTES: usize = N * T::BYTES;
+    #[inline(always)]
+    fn put(self, to: &mut [u8]) {
+        for (part, element) in to.chunks_exact_mut(T::BYTES).zip(self) {
+            element.put(part);
+        }
+    }
+    #[inline(always)]
+    fn get(from: &[u8]) -> Self {
+        std::array::from_fn(|i| T::get(&from[i * T::BYTES..(i + 1) * T::BYTES]))
+    }
+}
+
+/// Elements converted at a time: their bytes stay in the processor's cache.
+const PIECE_BYTES: usize = 1 << 18;
+
+/// A file of elements.
+#[derive(Debug)]
+pub struct Column<T> {
+    file: Positioned,
+    path: PathBuf,
+    len: u64,
+    of: PhantomData<T>,
+}
+
+impl<T: Element> Column<T> {
+    /// Makes the file, replacing one that is there. Elements that are not written are zero bytes.
+    ///
+    /// # Errors
+    /// The file cannot be made, or not in this length.
+    pub fn create(path: &Path, len: u64) -> Result<Column<T>, StoreError> {
+        let failed = |source| StoreError::io(path, "make the column", source);
+        let file = OpenOptions::new().read(true).write(true).create(true).truncate(true).open(path).map_err(failed)?;
+        file.set_len(len * T::BYTES as u64).map_err(failed)?;
+        Ok(Column { file: Positioned::new(file), path: path.to_owned(), len, of: PhantomData })
+    }
+
+    /// Opens a file that must hold `len` elements, for reading and writing.
+    ///
+    /// # Errors
+    /// It cannot be opened, or has another length.
+    pub fn open(path: &Path, len: u64) -> Result<Column<T>, StoreError> {
+        let failed = |source| StoreError::io(path, "open the column", source);
+        let file = OpenOptions::new().read(true).write(true).open(path).map_err(failed)?;
+        let (found, expected) = (file.metadata().map_err(failed)?.len(), len * T::BYTES as u64);
+        if found != expected {
+            let (path, element_bytes) = (path.to_owned(), T::BYTES);
+            return Err(StoreError::ColumnLength { path, elements: len, element_bytes, expected, found });
+        }
+        Ok(Column { file: Positioned::new(file), path: path.to_owned(), len, of: PhantomData })
+    }
+
+    /// Number of elements.
+    pub fn len(&self) -> u64 {
+        self.len
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Hands the elements of a range to `take`, in order.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn each(&self, range: Range<u64>, mut take: impl FnMut(T)) -> Result<(), StoreError> {
+        let step = (PIECE_BYTES / T::BYTES) as u64;
+        let mut bytes = vec![0; PIECE_BYTES.min((range.end.saturating_sub(range.start)) as usize * T::BYTES)];
+        let mut at = range.start;
+        while at < range.end {
+            let n = step.min(range.end - at);
+            let part = &mut bytes[..n as usize * T::BYTES];
+            self.file
+                .read_exact_at(part, at * T::BYTES as u64)
+                .map_err(|e| StoreError::io(&self.path, "read the column", e))?;
+            part.chunks_exact(T::BYTES).for_each(|element| take(T::get(element)));
+            at += n;
+        }
+        Ok(())
+    }
+
+    /// Appends the elements of a range.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn read(&self, range: Range<u64>, to: &mut Vec<T>) -> Result<(), StoreError> {
+        to.reserve(range.end.saturating_sub(range.start) as usize);
+        self.each(range, |element| to.push(element))
+    }
+
+    /// Writes elements from number `first` on.
+    ///
+    /// # Errors
+    /// The file cannot be written, as on a full disk.
+    pub fn write(&self, first: u64, elements: impl IntoIterator<Item = T>) -> Result<(), StoreError> {
+        let mut bytes = vec![0; PIECE_BYTES / T::BYTES * T::BYTES];
+        let (mut at, mut filled) = (first * T::BYTES as u64, 0);
+        let write = |part: &[u8], at| self.file.write_all_at(part, at).map_err(|e| self.unwritten(e));
+        for element in elements {
+            element.put(&mut bytes[filled..filled + T::BYTES]);
+            filled += T::BYTES;
+            if filled == bytes.len() {
+                write(&bytes, at)?;
+                (at, filled) = (at + filled as u64, 0);
+            }
+        }
+        write(&bytes[..filled], at)
+    }
+
+    /// Waits until the disk has it.
+    ///
+    /// # Errors
+    /// The disk says no.
+    pub fn sync(&self) -> Result<(), StoreError> {
+        self.file.file().sync_data().map_err(|e| self.unwritten(e))
+    }
+
+    fn unwritten(&self, source: std::io::Error) -> StoreError {
+        StoreError::io(&self.path, "write the column", source)
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use std::fs::File;
+
+    #[test]
+    fn elements_come_back_from_where_they_were_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("column");
+        let column = Column::<[f64; 3]>::create(&path, 100_000).unwrap();
+        let element = |i: u64| [i as f64, -1.0 / i as f64, f64::MIN_POSITIVE * i as f64];
+        column.write(50_000, (50_000..100_000).map(element)).unwrap();
+        column.write(10, (10..50_000).map(element)).unwrap();
+        let column = Column::<[f64; 3]>::open(&path, 100_000).unwrap();
+        let mut found = Vec::new();
+        column.read(5..99_990, &mut found).unwrap();
+        assert_eq!(found[..5], [[0.0; 3]; 5]);
+        assert!(found[5..].iter().zip(10..).all(|(&f, i)| f == element(i)));
+        assert!(column.read(99_999..100_001, &mut found).is_err());
+    }
+
+    #[test]
+    fn a_column_of_another_length_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("column");
+        Column::<u32>::create(&path, 7).unwrap();
+        let error = Column::<u32>::open(&path, 8).unwrap_err().to_string();
+        assert!(error.contains("has 28 bytes") && error.contains("32"), "{error}");
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_full_disk_is_named_as_such() {
+        let full = File::options().read(true).write(true).open("/dev/full").unwrap();
+        let column = Column::<u64> { file: Positioned::new(full), path: "/dev/full".into(), len: 9, of: PhantomData };
+        let error = column.write(0, 0..9).unwrap_err();
+        assert!(matches!(error, StoreError::Full { .. }), "{error}");
+    }
+}

@@ -1,0 +1,72 @@
+//! The folder in which a run keeps what it needs again.
+
+use super::{Column, Element, StoreError};
+use std::fs::{self, File, OpenOptions};
+use std::path::{Path, PathBuf};
+
+/// A folder of columns and scratch files. Stages name what they keep; only the shelf knows where.
+#[derive(Debug, Clone)]
+pub struct Shelf {
+    folder: PathBuf,
+}
+
+impl Shelf {
+    /// Makes the folder where it is not there.
+    ///
+    /// # Errors
+    /// It cannot be made.
+    pub fn new(folder: &Path) -> Result<Shelf, StoreError> {
+        fs::create_dir_all(folder).map_err(|e| StoreError::io(folder, "make the folder", e))?;
+        Ok(Shelf { folder: folder.to_owned() })
+    }
+
+    /// The folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// A file on the shelf.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.join(name)
+    }
+
+    /// A shelf within this one.
+    ///
+    /// # Errors
+    /// It cannot be made.
+    pub fn inner(&self, name: &str) -> Result<Shelf, StoreError> {
+        Shelf::new(&self.path(name))
+    }
+
+    /// A new column.
+    ///
+    /// # Errors
+    /// As [`Column::create`].
+    pub fn create<T: Element>(&self, name: &str, len: u64) -> Result<Column<T>, StoreError> {
+        Column::create(&self.path(name), len)
+    }
+
+    /// A column that is there.
+    ///
+    /// # Errors
+    /// As [`Column::open`].
+    pub fn open<T: Element>(&self, name: &str, len: u64) -> Result<Column<T>, StoreError> {
+        Column::open(&self.path(name), len)
+    }
+
+    /// Removes a file that is no longer needed. Nothing is lost if it stays.
+    pub fn remove(&self, name: &str) {
+        let _ = fs::remove_file(self.path(name));
+    }
+
+    /// A file that nobody will find again.
+    pub(super) fn scratch(&self, name: &str) -> Result<(File, PathBuf), StoreError> {
+        let path = self.path(&format!("{name}.scratch"));
+        let made = OpenOptions::new().read(true).write(true).create(true).truncate(true).open(&path);
+        let file = made.map_err(|e| StoreError::io(&path, "make the file", e))?;
+        // Where open files can be removed it is gone now, even if the run is killed; elsewhere it stays
+        // until the shelf is cleared.
+        let _ = fs::remove_file(&path);
+        Ok((file, path))
+    }
+}

@@ -1,0 +1,139 @@
+//! A patch: the triangles of a block of cells with their vertices, read from the index.
+
+use super::runs::{Lookup, Runs};
+use crate::geometry::DVec3;
+use crate::index::{CellBlock, Index};
+use crate::store::{Column, Element, StoreError};
+use std::ops::Range;
+
+/// Triangles whose centroid lies in a block of cells, with their vertices. Those outside the block, of which
+/// triangles at its border have a few, are among them.
+#[derive(Debug, Clone, Default)]
+pub struct Patch {
+    /// The survey's numbers of the vertices.
+    pub vertices: Runs,
+    /// Their positions, local metres.
+    pub positions: Vec<DVec3>,
+    /// The survey's numbers of the triangles.
+    pub triangles: Runs,
+    /// Their corners, as local numbers.
+    pub corners: Vec<[u32; 3]>,
+}
+
+/// Vertices that lie so near one another in the index are read at one go.
+const READ_THROUGH: u64 = 256;
+
+impl Patch {
+    /// Reads a block of cells.
+    ///
+    /// # Errors
+    /// The index cannot be read.
+    pub fn load(index: &Index, block: &CellBlock) -> Result<Patch, StoreError> {
+        let triangles = Runs::new(index.triangles.ranges(&index.grid, block));
+        let inside = Runs::new(index.vertices.ranges(&index.grid, block));
+        let (mut corners, outside) = corners(index, &triangles, &inside)?;
+        let vertices = with_outside(&inside, outside, &mut corners);
+        let mut positions = Vec::with_capacity(vertices.len());
+        each_of(index.positions(), &vertices, |p| positions.push(DVec3::from_array(p)))?;
+        Ok(Patch { vertices, positions, triangles, corners })
+    }
+
+    /// The corners of every triangle, local metres.
+    pub fn each_corners(&self) -> impl ExactSizeIterator<Item = [DVec3; 3]> + '_ {
+        self.corners.iter().map(|corners| corners.map(|v| self.positions[v as usize]))
+    }
+}
+
+/// Corners of the triangles as local numbers: those of `inside`, and behind them, in the order in which they
+/// were met, each time anew, those outside, which are returned by their survey numbers.
+fn corners(index: &Index, triangles: &Runs, inside: &Runs) -> Result<(Vec<[u32; 3]>, Vec<u64>), StoreError> {
+    let mut corners = Vec::with_capacity(triangles.len());
+    let mut outside = Vec::new();
+    let mut lookup = Lookup::new(inside);
+    for range in triangles.ranges() {
+        index.each_corners(range.clone(), |numbers| {
+            corners.push(numbers.map(|number| {
+                lookup.local(number).unwrap_or_else(|| {
+                    outside.push(number);
+                    (inside.len() + outside.len() - 1) as u32
+                })
+            }));
+        })?;
+    }
+    Ok((corners, outside))
+}
+
+/// Puts the vertices outside into their places, so that local numbers ascend with those of the survey.
+fn with_outside(inside: &Runs, met: Vec<u64>, corners: &mut [[u32; 3]]) -> Runs {
+    if met.is_empty() {
+        return inside.clone();
+    }
+    let mut outside = met.clone();
+    outside.sort_unstable();
+    outside.dedup();
+    let mut ranges: Vec<Range<u64>> = Vec::with_capacity(inside.ranges().len() + outside.len());
+    let mut between = outside.iter().copied().peekable();
+    let add = |ranges: &mut Vec<Range<u64>>, range: Range<u64>| match ranges.last_mut() {
+        Some(last) if last.end == range.start => last.end = range.end,
+        _ => ranges.push(range),
+    };
+    // How many vertices outside come before each run inside.
+    let mut shift = Vec::with_capacity(inside.ranges().len());
+    let mut shifted = 0u32;
+    for range in inside.ranges() {
+        while let Some(v) = between.next_if(|&v| v < range.start) {
+            add(&mut ranges, v..v + 1);
+            shifted += 1;
+        }
+        shift.push(shifted);
+        add(&mut ranges, range.clone());
+    }
+    between.for_each(|v| add(&mut ranges, v..v + 1));
+    let all = Runs::new(ranges);
+    let ends: Vec<u32> = inside
+        .ranges()
+        .iter()
+        .scan(0, |end, range| {
+            *end += (range.end - range.start) as u32;
+            Some(*end)
+        })
+        .collect();
+    let of_met: Vec<u32> = met.iter().filter_map(|&v| all.local(v)).collect();
+    let mut run = 0;
+    for corner in corners.iter_mut().flatten() {
+        if let Some(&local) = (*corner as usize).checked_sub(inside.len()).and_then(|i| of_met.get(i)) {
+            *corner = local;
+            continue;
+        }
+        let start = |run: usize| if run == 0 { 0 } else { ends[run - 1] };
+        if !(start(run) <= *corner && *corner < ends[run]) {
+            run = ends.partition_point(|&end| end <= *corner);
+        }
+        *corner += shift[run];
+    }
+    all
+}
+
+/// Hands the elements of a column that belong to the runs to `take`, in order.
+///
+/// # Errors
+/// The column cannot be read.
+pub fn each_of<T: Element>(column: &Column<T>, runs: &Runs, mut take: impl FnMut(T)) -> Result<(), StoreError> {
+    let mut rest = runs.ranges();
+    while let Some(first) = rest.first() {
+        // Short gaps are read and left out.
+        let near = rest.windows(2).take_while(|w| w[1].start - w[0].end <= READ_THROUGH).count() + 1;
+        let (together, after) = rest.split_at(near);
+        rest = after;
+        let end = together.last().map_or(first.end, |r| r.end);
+        let (mut at, mut i) = (first.start, 0);
+        column.each(first.start..end, |element| {
+            i += usize::from(at == together[i].end);
+            if at >= together[i].start {
+                take(element);
+            }
+            at += 1;
+        })?;
+    }
+    Ok(())
+}
