@@ -99,7 +99,7 @@ fn main() -> Result<()> {
         eprintln!("nothing measured: `cargo bench --bench survey` or tools/bench does");
         return Ok(());
     }
-    let mut rows = Vec::new();
+    let mut section = table::Section::begin(&options);
     for &size in &options.sizes {
         let order = if options.shuffle { "-shuffled" } else { "" };
         let name = format!("bed-{size}M-seed{}{order}", options.seed);
@@ -107,9 +107,8 @@ fn main() -> Result<()> {
         if !bed.exists() {
             make(&options, size, &bed)?;
         }
-        rows.extend(measured(&options, &bed)?);
+        section.append(&options, &measured(&options, &bed)?)?;
     }
-    table::append(&options, &rows)?;
     eprintln!("appended to {}", options.results.display());
     Ok(())
 }

@@ -1,4 +1,5 @@
-//! The table: a dated section for each bench, one row for each case, never overwritten.
+//! The table: a dated section for each bench, one row for each case, never overwritten. The rows of a bed are
+//! appended when it is done, so that an interrupted bench keeps those that were.
 
 use crate::Options;
 use crate::measure::{Case, Figures};
@@ -16,16 +17,39 @@ a median; rates are millions of survey triangles for each second of CPU.
 
 type Row = (Case, Vec<Figures>);
 
-/// Appends a section.
-pub(crate) fn append(options: &Options, rows: &[Row]) -> Result<()> {
-    let mut file = std::fs::OpenOptions::new().append(true).create(true).open(&options.results)?;
-    let head = if file.metadata()?.len() == 0 { HEAD } else { "" };
-    file.write_all(format!("{head}\n{}", section(options, rows)).as_bytes())?;
-    file.sync_all()
+/// A section that grows.
+pub(crate) struct Section {
+    /// What comes before its first row: the time and the commit at which the bench began.
+    heading: Option<String>,
+    /// Columns of stages, known from the first run.
+    stages: Vec<String>,
 }
 
-fn section(options: &Options, rows: &[Row]) -> String {
-    let mut text = format!(
+impl Section {
+    /// Of a bench that begins.
+    pub(crate) fn begin(options: &Options) -> Section {
+        Section { heading: Some(heading(options)), stages: Vec::new() }
+    }
+
+    /// Appends the rows of one bed.
+    pub(crate) fn append(&mut self, options: &Options, rows: &[Row]) -> Result<()> {
+        let mut file = std::fs::OpenOptions::new().append(true).create(true).open(&options.results)?;
+        let mut text = String::new();
+        if let (Some(heading), Some((_, figures))) = (self.heading.take(), rows.first()) {
+            self.stages = figures[0].stages.iter().map(|(name, _)| name.clone()).collect();
+            let head = if file.metadata()?.len() == 0 { HEAD } else { "" };
+            text = format!("{head}\n{heading}{}", columns(&self.stages));
+        }
+        for row in rows {
+            let _ = writeln!(text, "| {} |", cells(row, rows, &self.stages).join(" | "));
+        }
+        file.write_all(text.as_bytes())?;
+        file.sync_all()
+    }
+}
+
+fn heading(options: &Options) -> String {
+    format!(
         "## {}\n\n* {}, {} cores, {:?}\n* gravelometer {}, commit {}\n\
          * settings `{}`, max_grain_m {}; {} runs of each\n\n",
         said("date", &["-u", "+%Y-%m-%d %H:%M UTC"]),
@@ -37,8 +61,10 @@ fn section(options: &Options, rows: &[Row]) -> String {
         options.config,
         options.max_grain,
         options.repeats,
-    );
-    let stages: Vec<&str> = rows.first().map_or(Vec::new(), |(_, f)| f[0].stages.iter().map(|(n, _)| &**n).collect());
+    )
+}
+
+fn columns(stages: &[String]) -> String {
     let before = ["bed", "triangles", "grains", "tiles", "threads", "budget", "CPU s", "us/triangle"];
     let after = ["peak MiB", "wall s", "speed-up", "redundancy"];
     let names: Vec<String> = before
@@ -47,14 +73,10 @@ fn section(options: &Options, rows: &[Row]) -> String {
         .chain(stages.iter().map(|stage| format!("{stage} M/s")))
         .chain(after.iter().map(|&name| name.to_owned()))
         .collect();
-    let _ = writeln!(text, "| {} |\n|---{}|", names.join(" | "), "|---:".repeat(names.len() - 1));
-    for row in rows {
-        let _ = writeln!(text, "| {} |", cells(row, rows, &stages).join(" | "));
-    }
-    text
+    format!("| {} |\n|---{}|\n", names.join(" | "), "|---:".repeat(names.len() - 1))
 }
 
-fn cells((case, figures): &Row, rows: &[Row], stages: &[&str]) -> Vec<String> {
+fn cells((case, figures): &Row, rows: &[Row], stages: &[String]) -> Vec<String> {
     let any = &figures[0];
     let (cpu_s, wall_s) = (median(figures, |f| f.cpu_s), median(figures, |f| f.wall_s));
     let mut cells = vec![
