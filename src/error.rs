@@ -1,11 +1,14 @@
 //! What can end a run, and how the process then exits.
 
 use crate::demo::DemoError;
+use crate::forecast::ForecastError;
 use crate::index::IndexError;
 use crate::open::OpenError;
-use crate::pipeline::{Interrupted, LostJob};
+use crate::pipeline::{Interrupted, LostJob, Stopped};
+use crate::resume::ResumeError;
 use crate::settings::SettingsError;
 use crate::statistics::RasterError;
+use crate::stitch::RecordError;
 use crate::store::StoreError;
 use crate::write::WriteError;
 
@@ -38,13 +41,22 @@ pub enum Error {
     #[error(transparent)]
     Interrupted(#[from] Interrupted),
     /// A tile of a pass on which all others depend panicked.
-    #[error("part {} of the {pass} pass failed: {}\nhelp: this is a bug; please report it with the input's header and the command", lost.job, lost.message)]
+    #[error("part {} of the {pass} pass failed: {}\nhelp: what was done is kept; the same command with --resume tries that part again", lost.job, lost.message)]
     TileFailed {
         /// The pass.
         pass: &'static str,
         /// The tile and what it said.
         lost: LostJob,
     },
+    /// An interrupted run cannot be resumed.
+    #[error(transparent)]
+    Resume(#[from] ResumeError),
+    /// What a tile found cannot be recorded or read again.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// The run needs more than there is.
+    #[error(transparent)]
+    Forecast(#[from] ForecastError),
     /// The compute threads could not be started.
     #[error("cannot start {threads} compute threads: {source}\nhelp: ask for fewer with --threads")]
     Threads {
@@ -70,11 +82,21 @@ pub enum ExitCode {
     Interrupted = 130,
 }
 
+impl<E: Into<Error>> From<Stopped<E>> for Error {
+    fn from(stopped: Stopped<E>) -> Error {
+        match stopped {
+            Stopped::Interrupted => Error::Interrupted(Interrupted),
+            Stopped::Collecting(error) => error.into(),
+        }
+    }
+}
+
 impl Error {
     /// The exit code that fits.
     pub fn exit_code(&self) -> ExitCode {
         match self {
-            Error::Settings(_) | Error::Raster(_) => ExitCode::Usage,
+            Error::Settings(_) | Error::Raster(_) | Error::Forecast(_) => ExitCode::Usage,
+            Error::Resume(ResumeError::Changed { .. }) => ExitCode::Usage,
             Error::Open(open) if open.is_about_settings() => ExitCode::Usage,
             Error::Interrupted(_) => ExitCode::Interrupted,
             _ => ExitCode::Failed,

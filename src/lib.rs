@@ -42,6 +42,8 @@ pub mod cli;
 pub mod costs;
 pub mod demo;
 pub mod error;
+pub mod forecast;
 pub mod inspect;
 pub mod passes;
+pub mod resume;
 pub mod run;

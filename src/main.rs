@@ -5,11 +5,12 @@ use gravelometer::cli::{Cli, Command, DemoArgs, InspectArgs, Log, RunArgs, Setti
 use gravelometer::cli::{cost_table, report_error, reporter};
 use gravelometer::demo::{Demonstration, demonstrate};
 use gravelometer::error::{Error, ExitCode};
-use gravelometer::pipeline::Control;
+use gravelometer::pipeline::{Control, Interrupted};
 use gravelometer::progress::Progress;
 use gravelometer::run::{Job, run};
 use gravelometer::settings::InputSettings;
 use std::io::Write;
+use std::time::Duration;
 
 fn main() -> std::process::ExitCode {
     let (log, result) = match Cli::parse().command {
@@ -25,7 +26,10 @@ fn main() -> std::process::ExitCode {
     std::process::ExitCode::from(code as u8)
 }
 
-/// The flag that Ctrl-C sets; tiles in flight are finished first. A second Ctrl-C ends the process at once.
+/// Time for a run that was interrupted to end by itself.
+const GRACE: Duration = Duration::from_millis(1200);
+
+/// The flag that Ctrl-C sets. A run that does not heed it soon is ended.
 fn control(progress: &dyn Progress, log: Log) -> Control {
     let control = Control::default();
     let flag = control.clone();
@@ -33,10 +37,10 @@ fn control(progress: &dyn Progress, log: Log) -> Control {
         if flag.cancel() {
             std::process::exit(ExitCode::Interrupted as i32);
         }
-        if log == Log::Text {
-            let _ =
-                writeln!(std::io::stderr().lock(), "stopping after the tiles in flight; Ctrl-C again stops at once");
-        }
+        // What is kept on disk is whole at any moment, so a tile in flight need not be waited for.
+        std::thread::sleep(GRACE);
+        report_error(log, &Error::Interrupted(Interrupted));
+        std::process::exit(ExitCode::Interrupted as i32);
     });
     if let Err(error) = set {
         progress.warn(&format!("Ctrl-C will end the run at once: {error}"));
@@ -46,7 +50,14 @@ fn control(progress: &dyn Progress, log: Log) -> Control {
 
 fn run_command(args: &RunArgs) -> Result<ExitCode, Error> {
     let settings = args.settings.settings()?;
-    let job = Job { inputs: args.inputs.clone(), out: args.out.clone(), settings, force: args.force };
+    let job = Job {
+        inputs: args.inputs.clone(),
+        out: args.out.clone(),
+        settings,
+        force: args.force,
+        resume: args.resume,
+        work: args.work_dir.clone(),
+    };
     let progress = reporter(args.log);
     let outcome = run(&job, &*progress, &control(&*progress, args.log))?;
     if args.log == Log::Text {

@@ -3,18 +3,19 @@
 use crate::costs::{Costs, Meter};
 use crate::curvature::Stencil;
 use crate::error::Error;
+use crate::forecast;
 use crate::index::{BuildRoom, Index};
 use crate::measure::Wanted;
 use crate::open::Reach;
 use crate::passes::{Recipe, Survey};
-use crate::pipeline::{Budget, Control, Crew, Interrupted, LostJob, memory_there_bytes};
+use crate::pipeline::{Budget, Control, Crew, LostJob, memory_there_bytes};
 use crate::progress::{Progress, Unit};
+use crate::resume::{Curvature, WORK, WorkFolder};
 use crate::segment::smallest_grain_area_m2;
 use crate::settings::Settings;
 use crate::statistics::RasterGrid;
 use crate::stitch::{Catalogue, TileReport, stitch};
-use crate::store::Shelf;
-use crate::tile::{NormalField, Plan, TileMesh};
+use crate::tile::Plan;
 use crate::write::{OutputFolder, Results, WholeMesh, WriteError, write_all};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -30,6 +31,11 @@ pub struct Job {
     pub settings: Settings,
     /// Whether results that are there may be replaced.
     pub force: bool,
+    /// Whether to go on where an interrupted run stopped. Without one, the run begins as usual.
+    pub resume: bool,
+    /// Folder for what is needed again: it stays, and later runs on the same survey use it. Otherwise it is a
+    /// folder in `out`, and goes when the run is done.
+    pub work: Option<PathBuf>,
 }
 
 /// What a run did.
@@ -61,73 +67,81 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let progress: &dyn Progress = &meter;
     let settings = &job.settings;
     settings.check()?;
-    let folder = OutputFolder::create(&job.out, job.force, &[])?;
+    let folder = OutputFolder::create(&job.out, job.force || job.resume, &[WORK])?;
     folder.spare(&job.inputs)?;
-    let crew = crew(settings, control)?;
+    let work = WorkFolder::open(job.work.as_deref(), &job.out)?;
+    let (pool, memory) = (pool(settings)?, memory_bytes(settings));
+    let threads = pool.current_num_threads();
 
     // open
-    let (reach, warnings) = crew.pool.install(|| open(job, progress))?;
+    let (reach, warnings) = pool.install(|| open(job, progress))?;
     control.check()?;
     let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
     warnings.iter().for_each(|w| progress.warn(w));
+    work.begin(&reach, settings, job.resume)?;
 
     // index
-    progress.begin("index", reach.triangles(), Unit::Triangles);
-    let shelf = Shelf::new(&job.out.join("work"))?;
-    let room = BuildRoom { bytes: crew.budget.total_bytes() / 2, ..BuildRoom::default() };
-    let mut index = crew.pool.install(|| Index::build(&reach, &shelf, room))?;
-    progress.advance(reach.triangles());
-    progress.end();
+    let room = forecast::room(&reach, memory)?;
+    let crew = Crew { pool, budget: Budget::strict(room.bytes), control: control.clone() };
+    let mut index = match work.index(&reach)? {
+        Some(index) => index,
+        None => {
+            let disk = forecast::disk(&reach, &work.path().display().to_string(), work.free_bytes())?;
+            progress.note(&format!("the index takes {} MiB in {}", disk >> 20, work.path().display()));
+            make_index(&reach, &work, room, &crew, progress)?
+        }
+    };
     control.check()?;
     check_outputs(&reach, &index, settings)?;
 
     // plan
-    let plans = plans(&index, settings, &crew);
-    let plan = &plans.grains;
+    let sides = forecast::sides(&index, settings, threads, room.bytes);
+    let mut curvature = work.curvature(&reach, &index, settings)?;
+    let mut findings = work.findings(&reach, settings)?;
+    let vertex_plan = Plan::new(&index, curvature.side_m(sides.curvature_m)?);
+    let plan = Plan::new(&index, findings.side_m(sides.grains_m)?);
+    let tiles_bytes = forecast::tiles_bytes(&Survey { index: &index, plan: &plan }, settings, threads, room.bytes)?;
     progress.note(&format!(
-        "{} tiles of {:.3} m, {} threads, {} MiB of memory for tiles",
+        "{} tiles of {:.3} m, {threads} threads; peak memory about {} MiB of {} MiB",
         plan.tiles.len(),
         plan.tile_size_m,
-        crew.pool.current_num_threads(),
-        crew.budget.total_bytes() >> 20
+        (tiles_bytes + forecast::fixed_bytes(&reach)) >> 20,
+        memory >> 20
     ));
 
-    // tile by tile: spacing, curvature, then segment and measure
-    let (spacing_m, lost) =
-        Survey { index: &index, plan: &plans.curvature }.spacing(&crew, progress).map_err(|_| Interrupted)?;
-    none_lost("spacing", lost)?;
-    index.scale.spacing_m = spacing_m;
+    // tile by tile: spacing, curvature
+    index.scale.spacing_m = curvature.spacing_m(|| {
+        let (spacing_m, lost) = Survey { index: &index, plan: &vertex_plan }.spacing(&crew, progress)?;
+        none_lost("spacing", lost).map(|()| spacing_m)
+    })?;
     let stencil = Stencil::new(index.scale.spacing_m, index.scale.mean_triangle_area_m2, &settings.curvature);
-    let divergence = shelf.create("divergence", index.scale.vertices)?;
-    let survey = Survey { index: &index, plan: &plans.curvature };
-    let jobs: Vec<usize> = (0..plans.curvature.tiles.len()).collect();
-    none_lost(
-        "curvature",
-        survey
-            .divergence(&crew, &jobs, &stencil, &divergence, progress, |_, _| Ok::<_, ()>(()))
-            .map_err(|_| Interrupted)?,
-    )?;
+    let survey = Survey { index: &index, plan: &vertex_plan };
+    let jobs = curvature.missing(&index, &vertex_plan)?;
+    let Curvature { divergence, tiles } = &mut curvature;
+    let lost = survey.divergence(&crew, &jobs, &stencil, divergence, progress, |job, values| {
+        tiles.done(vertex_plan.tiles[job].id, values)
+    })?;
+    none_lost("curvature", lost)?;
+
+    // tile by tile: segment and measure
     let outline_step_m = reach.frame().outline_step_m();
     let wanted = Wanted { outline_step_m, triangle_ids: settings.output.labelled_mesh };
-    let recipe = Recipe { settings: &settings.segment, divergence: &divergence, wanted };
-    let survey = Survey { index: &index, plan };
-    let jobs: Vec<usize> = (0..plan.tiles.len()).collect();
-    let mut findings = Vec::new();
-    let found_lost = survey
-        .grains(&crew, &jobs, &recipe, progress, |_, finding| {
-            findings.push(finding);
-            Ok::<_, ()>(())
-        })
-        .map_err(|_| Interrupted)?;
+    let recipe = Recipe { settings: &settings.segment, divergence, wanted };
+    let survey = Survey { index: &index, plan: &plan };
+    let jobs = findings.missing(&plan);
+    if jobs.len() < plan.tiles.len() {
+        progress.note(&format!("{} of {} tiles are done already", plan.tiles.len() - jobs.len(), plan.tiles.len()));
+    }
+    let lost = survey.grains(&crew, &jobs, &recipe, progress, |_, finding| findings.add(&finding))?;
     let tile = |lost: &LostJob| plan.tiles[lost.job].id;
-    found_lost.iter().for_each(|lost| progress.warn(&format!("tile {} is lost: {}", tile(lost), lost.message)));
+    lost.iter().for_each(|lost| progress.warn(&format!("tile {} is lost: {}", tile(lost), lost.message)));
 
     // stitch
     let touch_steps = (TOUCH_EDGES * index.scale.mean_edge_m / outline_step_m) as i64;
-    let (catalogue, tiles) = stitch(findings, touch_steps);
+    let (catalogue, tiles) = stitch(findings.all(&plan)?, touch_steps);
 
     // statistics and write
-    let mut facts = facts(&reach, &index, plan, &warnings, &found_lost);
+    let mut facts = facts(&reach, &index, &plan, &warnings, &lost);
     let segmented_per_triangle = segmented_per_triangle(&tiles);
     facts["segmented_per_triangle"] = segmented_per_triangle.into();
     let mesh = WholeMesh::new(&reach);
@@ -145,28 +159,48 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
         mesh: settings.output.labelled_mesh.then_some(&mesh),
     };
     let files = write(&folder, &results, progress)?;
-    let (lost, triangles, costs) = (found_lost, reach.triangles(), meter.costs());
+    if lost.is_empty() {
+        drop((index, curvature, findings));
+        work.finish();
+    }
+    let (triangles, costs) = (reach.triangles(), meter.costs());
     Ok(Outcome { files, catalogue, lost, segmented_per_triangle, triangles, costs })
 }
 
 /// Outlines within this many mean edges touch: grains are separated by a valley of a few triangles.
 const TOUCH_EDGES: f64 = 4.0;
-/// Share of the memory that is there for tiles in flight, unless a budget is set.
+/// Share of the memory that is there, unless a budget is set.
 const SHARE_OF_MEMORY: f64 = 0.5;
 /// Budget where the system does not tell what is there, bytes.
 const MEMORY_IF_UNKNOWN: u64 = 2 << 30;
 
-fn crew(settings: &Settings, control: &Control) -> Result<Crew, Error> {
+fn pool(settings: &Settings) -> Result<rayon::ThreadPool, Error> {
     let threads = settings.work.threads;
-    let pool = rayon::ThreadPoolBuilder::new()
+    rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .thread_name(|i| format!("worker-{i}"))
         .build()
-        .map_err(|source| Error::Threads { threads, source })?;
-    let bytes = settings.memory_bytes().unwrap_or_else(|| {
+        .map_err(|source| Error::Threads { threads, source })
+}
+
+fn memory_bytes(settings: &Settings) -> u64 {
+    settings.memory_bytes().unwrap_or_else(|| {
         memory_there_bytes().map_or(MEMORY_IF_UNKNOWN, |there| (there as f64 * SHARE_OF_MEMORY) as u64)
-    });
-    Ok(Crew { pool, budget: Budget::new(bytes), control: control.clone() })
+    })
+}
+
+fn make_index(
+    reach: &Reach,
+    work: &WorkFolder,
+    room: BuildRoom,
+    crew: &Crew,
+    progress: &dyn Progress,
+) -> Result<Index, Error> {
+    progress.begin("index", reach.triangles(), Unit::Triangles);
+    let index = crew.pool.install(|| work.make_index(reach, |shelf| Index::build(reach, shelf, room)))?;
+    progress.advance(reach.triangles());
+    progress.end();
+    Ok(index)
 }
 
 fn open(job: &Job, progress: &dyn Progress) -> Result<(Reach, Vec<crate::open::Warning>), Error> {
@@ -179,33 +213,6 @@ fn open(job: &Job, progress: &dyn Progress) -> Result<(Reach, Vec<crate::open::W
     });
     progress.end();
     Ok(opened?)
-}
-
-/// How the survey is cut, for each kind of pass.
-struct Plans {
-    curvature: Plan,
-    grains: Plan,
-}
-
-/// Largest cores, triangles.
-const LARGEST_CORE: f64 = 8e6;
-const LARGEST_CURVATURE_CORE: f64 = 2e6;
-/// Triangles that a core's halo may add to it.
-const WITH_HALO: f64 = 1.3;
-
-fn plans(index: &Index, settings: &Settings, crew: &Crew) -> Plans {
-    let threads = crew.pool.current_num_threads() as f64;
-    let triangles = index.scale.triangles as f64;
-    let memory = crew.budget.total_bytes() as f64 / threads / WITH_HALO;
-    let cut = |bytes: u64, least: f64, most: f64| {
-        let shared = if threads > 1.0 { triangles / (3.0 * threads) } else { triangles };
-        Plan::side_m(index, (memory / bytes as f64).min(shared.max(least)).min(most))
-    };
-    let chosen = |side_m: f64| if settings.work.tile_size_m > 0.0 { settings.work.tile_size_m } else { side_m };
-    Plans {
-        curvature: Plan::new(index, chosen(cut(NormalField::footprint_bytes(1), 2.5e5, LARGEST_CURVATURE_CORE))),
-        grains: Plan::new(index, chosen(cut(TileMesh::footprint_bytes(1), 1e6, LARGEST_CORE))),
-    }
 }
 
 /// Refuses what cannot be written before the long work begins.

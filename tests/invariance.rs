@@ -40,7 +40,14 @@ impl Scene {
         settings.work.memory = work.memory.into();
         settings.input.offset = work.offset;
         let out = self.folder.path().join(name);
-        let job = Job { inputs: vec![self.mesh.clone()], out: out.clone(), settings, force: false };
+        let job = Job {
+            inputs: vec![self.mesh.clone()],
+            out: out.clone(),
+            settings,
+            force: false,
+            resume: false,
+            work: None,
+        };
         let outcome = run(&job, &Silent, &Control::default()).unwrap();
         assert!(outcome.lost.is_empty(), "{:?}", outcome.lost);
         let report: serde_json::Value = serde_json::from_slice(&std::fs::read(out.join("run.json")).unwrap()).unwrap();
@@ -96,7 +103,7 @@ fn is_invariant(scene: &Scene, sizes_m: [f64; 2]) -> Outcome {
     let one = Work { tile_size_m: 1e6, threads: 2, memory: "", offset: none };
     let (reference, outcome, tiles) = scene.run("one", &one);
     assert_eq!(tiles, 1);
-    for (i, (threads, memory)) in [(1, "64MiB"), (2, "64MiB")].into_iter().enumerate() {
+    for (i, (threads, memory)) in [(1, "96MiB"), (2, "96MiB")].into_iter().enumerate() {
         let work = Work { tile_size_m: sizes_m[i], threads, memory, offset: none };
         let (out, _, tiles) = scene.run(&format!("tiled-{i}"), &work);
         assert!(tiles >= [9, 60][i], "{tiles} tiles");

@@ -3,7 +3,7 @@
 
 mod support;
 
-use gravelometer::store::{ColumnFile, KILL_AT, Ledger, StoreError, write_atomically};
+use gravelometer::store::{Column, KILL_AT, Ledger, StoreError, write_atomically};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use support::small_disk::SmallDisk;
@@ -154,7 +154,7 @@ fn a_column_on_a_full_disk_is_called_so() {
         println!("skipped: this user cannot mount a small disk");
         return;
     };
-    let written = ColumnFile::create(&disk.path().join("positions"), 24, 10_000)
-        .and_then(|column| column.write_values(0, &vec![[1.0f64, 2.0, 3.0]; 10_000]));
+    let written = Column::create(&disk.path().join("positions"), 10_000)
+        .and_then(|column| column.write(0, vec![[1.0f64, 2.0, 3.0]; 10_000]));
     assert!(matches!(written, Err(StoreError::Full { .. })), "{written:?}");
 }

@@ -15,7 +15,7 @@ use support::bed::{bed, write_ply};
 
 fn job(mesh: &Path, out: &Path) -> Job {
     let settings = Settings::load(None, &["segment.min_grain_area_m2=1e-4".into()]).unwrap();
-    Job { inputs: vec![mesh.to_owned()], out: out.to_owned(), settings, force: true }
+    Job { inputs: vec![mesh.to_owned()], out: out.to_owned(), settings, force: true, resume: false, work: None }
 }
 
 fn work(job: &Job) -> Result<Outcome, Error> {

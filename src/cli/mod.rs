@@ -80,6 +80,13 @@ pub struct RunArgs {
     /// Replace results that are in OUT
     #[arg(long)]
     pub force: bool,
+    /// Go on where an interrupted run in OUT stopped (also after a crash or a full disk); begin if there is none
+    #[arg(long)]
+    pub resume: bool,
+    /// Folder for the index and what else is needed again, about 70 bytes for each triangle; it is kept, so that
+    /// later runs on the same survey with other settings are quicker [default: in OUT, removed at the end]
+    #[arg(long, value_name = "DIR")]
+    pub work_dir: Option<PathBuf>,
     /// How progress is told on standard error
     #[arg(long, value_enum, default_value = "text")]
     pub log: Log,
@@ -120,7 +127,7 @@ pub struct SettingArgs {
     /// Compute threads; 0: all cores [work.threads; default: 0]
     #[arg(long, value_name = "N", help_heading = "Work")]
     pub threads: Option<usize>,
-    /// Memory for tiles in flight, such as 2GiB [work.memory; default: half of what is there]
+    /// Most memory to use, such as 2GiB [work.memory; default: half of what is there]
     #[arg(long, value_name = "SIZE", help_heading = "Work")]
     pub memory: Option<String>,
     /// Also write the input mesh with a grain_id for each face [output.labelled_mesh; default: false]

@@ -85,7 +85,8 @@ pub fn demonstrate(what: &Demonstration, progress: &dyn Progress, control: &Cont
     settings.segment.min_grain_area_m2 = MIN_GRAIN_AREA_M2;
     settings.work.threads = what.threads;
     settings.output.labelled_mesh = true;
-    let job = Job { inputs: vec![path("scene.ply")], out: path("results"), settings, force: what.force };
+    let (inputs, out) = (vec![path("scene.ply")], path("results"));
+    let job = Job { inputs, out, settings, force: what.force, resume: false, work: None };
     let outcome = run(&job, progress, control)?;
 
     let mut grain_of_triangle = vec![-1i64; scene.triangles.len()];

@@ -1,12 +1,13 @@
 //! Square cells in plan, and which triangles and vertices lie in which.
 
 use crate::geometry::{DVec3, PlanBox};
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// A grid of square cells that covers the survey in plan.
 ///
 /// It depends on the survey only, never on the tiling: tiles are blocks of whole cells.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CellGrid {
     /// South-west corner, local metres.
     pub min: [f64; 2],

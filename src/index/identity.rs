@@ -71,6 +71,10 @@ impl<const N: usize> Numbers<N> {
         }
     }
 
+    pub(super) fn is_wide(&self) -> bool {
+        matches!(self, Numbers::Wide(_))
+    }
+
     pub(super) fn sync(&self) -> Result<(), StoreError> {
         match self {
             Numbers::Narrow(column) => column.sync(),

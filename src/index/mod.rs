@@ -17,6 +17,7 @@ mod chunks;
 mod corners;
 mod ground;
 mod identity;
+mod manifest;
 mod scale;
 mod shards;
 mod triangles;
@@ -73,6 +74,13 @@ struct Columns {
     colors: Option<(f64, Column<[f32; 3]>)>,
 }
 
+const POSITIONS: &str = "positions";
+const VALENCES: &str = "valences";
+const CORNERS: &str = "corners";
+const VERTEX_INPUTS: &str = "vertex_inputs";
+const TRIANGLE_INPUTS: &str = "triangle_inputs";
+const COLORS: &str = "colors";
+
 /// How an index may be built. Never changes what is in it.
 #[derive(Debug, Clone, Copy)]
 pub struct BuildRoom {
@@ -103,13 +111,13 @@ impl Index {
         let wide = room.wide || !fits(surface.vertices()) || !fits(surface.triangles());
         let shards = shards::cut(&ground.in_row, shard_vertices(ground.vertices, room));
         let columns = Columns {
-            positions: shelf.create("positions", ground.vertices)?,
-            valences: shelf.create("valences", ground.vertices)?,
-            corners: Numbers::create(shelf, "corners", surface.triangles(), wide)?,
-            vertex_inputs: Numbers::create(shelf, "vertex_inputs", ground.vertices, wide)?,
-            triangle_inputs: Numbers::create(shelf, "triangle_inputs", surface.triangles(), wide)?,
+            positions: shelf.create(POSITIONS, ground.vertices)?,
+            valences: shelf.create(VALENCES, ground.vertices)?,
+            corners: Numbers::create(shelf, CORNERS, surface.triangles(), wide)?,
+            vertex_inputs: Numbers::create(shelf, VERTEX_INPUTS, ground.vertices, wide)?,
+            triangle_inputs: Numbers::create(shelf, TRIANGLE_INPUTS, surface.triangles(), wide)?,
             colors: match surface.full_color() {
-                Some(full) => Some((full, shelf.create("colors", ground.vertices)?)),
+                Some(full) => Some((full, shelf.create(COLORS, ground.vertices)?)),
                 None => None,
             },
         };
@@ -193,6 +201,15 @@ fn sort_triangles<I: identity::Id>(
         valences: &columns.valences,
     };
     triangles::sort::<I>(&scatter, &ground.grid, shards, &to)
+}
+
+/// Bytes that an index takes on disk, with the scratch files of its making and the divergence of every vertex.
+pub fn disk_bytes(vertices: u64, triangles: u64, has_colors: bool) -> u64 {
+    let wide = vertices.max(triangles) > u64::from(u32::MAX);
+    let number = if wide { 8 } else { 4 };
+    let colors = if has_colors { 12 } else { 0 };
+    let scratch = (vertices * 48).max(triangles * 4 * number);
+    vertices * (24 + 2 + 8 + number + colors) + triangles * 4 * number + scratch
 }
 
 /// Vertices of a shard or of a block, at least.

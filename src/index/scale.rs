@@ -1,9 +1,10 @@
 //! The scale of a survey: every number that all tiles must share.
 
 use crate::geometry::DVec3;
+use serde::{Deserialize, Serialize};
 
 /// Survey-wide figures, from exact sums: the same bits whatever the tiling or the order of the file.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Scale {
     /// Number of vertices that triangles use.
     pub vertices: u64,

@@ -3,7 +3,7 @@
 use super::{Survey, TileError};
 use crate::curvature::{Stencil, divergence, nearest_centroid_m};
 use crate::geometry::{DVec3, ExactSum};
-use crate::pipeline::{Crew, LostJob, Reservation, Stages, Stopped, over_jobs};
+use crate::pipeline::{Crew, Interrupted, LostJob, Reservation, Stages, Stopped, over_jobs};
 use crate::progress::{Progress, Unit};
 use crate::store::Column;
 use crate::tile::NormalField;
@@ -25,7 +25,7 @@ impl Survey<'_> {
     ///
     /// # Errors
     /// When interrupted.
-    pub fn spacing(&self, crew: &Crew, progress: &dyn Progress) -> Result<(f64, Vec<LostJob>), Stopped<Infallible>> {
+    pub fn spacing(&self, crew: &Crew, progress: &dyn Progress) -> Result<(f64, Vec<LostJob>), Interrupted> {
         let side_m = self.index.scale.mean_triangle_area_m2.sqrt();
         let mut sum = ExactSum::ZERO;
         let nearest = |field: &NormalField, points: &[DVec3]| nearest_centroid_m(field, points, side_m);
@@ -46,7 +46,8 @@ impl Survey<'_> {
             Ok(())
         });
         progress.end();
-        Ok((sum.value() / self.index.scale.vertices.max(1) as f64, lost?))
+        let lost = lost.map_err(|_: Stopped<Infallible>| Interrupted)?;
+        Ok((sum.value() / self.index.scale.vertices.max(1) as f64, lost))
     }
 
     /// Divergence of the normal field at every vertex, 1/m, into `column`, for the tiles of `jobs`. `done` hears

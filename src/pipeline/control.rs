@@ -11,7 +11,7 @@ pub struct Control {
 
 /// The run was cancelled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("interrupted; nothing was written\nhelp: run the same command again")]
+#[error("interrupted; no result was written, but what is done is kept\nhelp: the same command with --resume goes on")]
 pub struct Interrupted;
 
 impl Control {

@@ -1,6 +1,6 @@
 //! The folder in which a run keeps what it needs again.
 
-use super::{Column, Element, StoreError};
+use super::{Column, Element, Entry, Ledger, StoreError, write_atomically};
 use std::fs::{self, File, OpenOptions};
 use std::path::{Path, PathBuf};
 
@@ -54,6 +54,39 @@ impl Shelf {
         Column::open(&self.path(name), len)
     }
 
+    /// Writes a small file, whole or not at all.
+    ///
+    /// # Errors
+    /// The disk says no.
+    pub fn put(&self, name: &str, bytes: &[u8]) -> Result<(), StoreError> {
+        write_atomically(&self.path(name), bytes)
+    }
+
+    /// The bytes of a small file, if it is there and can be read.
+    pub fn get(&self, name: &str) -> Option<Vec<u8>> {
+        fs::read(self.path(name)).ok()
+    }
+
+    /// Opens the ledger of this name and identity. One of another identity, or a damaged one, is begun anew.
+    ///
+    /// # Errors
+    /// As [`Ledger::open`].
+    pub fn ledger(&self, name: &str, identity: &str) -> Result<(Ledger, Vec<Entry>), StoreError> {
+        use StoreError::{DamagedHeader, Format, NotALedger, OtherIdentity};
+        match Ledger::open(&self.path(name), identity) {
+            Err(OtherIdentity { .. } | DamagedHeader { .. } | Format { .. } | NotALedger { .. }) => {
+                self.remove(name);
+                Ledger::open(&self.path(name), identity)
+            }
+            opened => opened,
+        }
+    }
+
+    /// Bytes that are free on the shelf's disk; none where the system does not tell.
+    pub fn free_bytes(&self) -> Option<u64> {
+        free_bytes(&self.folder)
+    }
+
     /// Removes a file that is no longer needed. Nothing is lost if it stays.
     pub fn remove(&self, name: &str) {
         let _ = fs::remove_file(self.path(name));
@@ -69,4 +102,15 @@ impl Shelf {
         let _ = fs::remove_file(&path);
         Ok((file, path))
     }
+}
+
+#[cfg(unix)]
+fn free_bytes(folder: &Path) -> Option<u64> {
+    let disk = rustix::fs::statvfs(folder).ok()?;
+    disk.f_bavail.checked_mul(disk.f_frsize)
+}
+
+#[cfg(not(unix))]
+fn free_bytes(_: &Path) -> Option<u64> {
+    None
 }

@@ -1,0 +1,97 @@
+//! The manifest of an index: what a later run needs to use it again.
+
+use super::cells::{CellGrid, CellStarts};
+use super::identity::Numbers;
+use super::{COLORS, CORNERS, Columns, Index, POSITIONS, Scale, TRIANGLE_INPUTS, VALENCES, VERTEX_INPUTS};
+use crate::store::{Column, Shelf, StoreError};
+use serde::{Deserialize, Serialize};
+
+const MANIFEST: &str = "manifest";
+const VERTEX_STARTS: &str = "vertex_starts";
+const TRIANGLE_STARTS: &str = "triangle_starts";
+
+/// Must change when the meaning of a column does.
+const FORMAT: u32 = 1;
+
+#[derive(Serialize, Deserialize)]
+struct Manifest {
+    format: u32,
+    identity: String,
+    grid: CellGrid,
+    scale: Scale,
+    wide: bool,
+    full_color: Option<f64>,
+}
+
+impl Index {
+    /// Makes an index that was built on a shelf fit to be opened again: its columns are flushed to the disk, and
+    /// then its manifest is written. `identity` says what it is an index of.
+    ///
+    /// # Errors
+    /// The disk says no.
+    pub fn keep(&self, shelf: &Shelf, identity: &str) -> Result<(), StoreError> {
+        for (name, cells) in [(VERTEX_STARTS, &self.vertices), (TRIANGLE_STARTS, &self.triangles)] {
+            let column: Column<u64> = shelf.create(name, cells.starts().len() as u64)?;
+            column.write(0, cells.starts().iter().copied())?;
+            column.sync()?;
+        }
+        let columns = &self.columns;
+        columns.positions.sync()?;
+        columns.valences.sync()?;
+        columns.corners.sync()?;
+        columns.vertex_inputs.sync()?;
+        columns.triangle_inputs.sync()?;
+        if let Some((_, colors)) = &columns.colors {
+            colors.sync()?;
+        }
+        let manifest = Manifest {
+            format: FORMAT,
+            identity: identity.to_owned(),
+            grid: self.grid.clone(),
+            scale: self.scale,
+            wide: columns.corners.is_wide(),
+            full_color: columns.colors.as_ref().map(|(full, _)| *full),
+        };
+        // Plain numbers and a text can always be put into bytes.
+        let bytes = postcard::to_extend(&manifest, Vec::new()).unwrap_or_default();
+        shelf.put(MANIFEST, &bytes)
+    }
+
+    /// Opens the index on a shelf, if there is a whole one of this identity.
+    pub fn open(shelf: &Shelf, identity: &str) -> Option<Index> {
+        let bytes = shelf.get(MANIFEST)?;
+        let manifest: Manifest = postcard::from_bytes(&bytes).ok()?;
+        if manifest.format != FORMAT || manifest.identity != identity {
+            return None;
+        }
+        let (scale, wide) = (manifest.scale, manifest.wide);
+        let cells = manifest.grid.len() as u64 + 1;
+        let starts = |name| -> Option<CellStarts> {
+            let mut starts = Vec::new();
+            shelf.open::<u64>(name, cells).ok()?.read(0..cells, &mut starts).ok()?;
+            Some(CellStarts::new(starts))
+        };
+        Some(Index {
+            triangles: starts(TRIANGLE_STARTS)?,
+            vertices: starts(VERTEX_STARTS)?,
+            grid: manifest.grid,
+            scale,
+            columns: Columns {
+                positions: shelf.open(POSITIONS, scale.vertices).ok()?,
+                valences: shelf.open(VALENCES, scale.vertices).ok()?,
+                corners: Numbers::open(shelf, CORNERS, scale.triangles, wide).ok()?,
+                vertex_inputs: Numbers::open(shelf, VERTEX_INPUTS, scale.vertices, wide).ok()?,
+                triangle_inputs: Numbers::open(shelf, TRIANGLE_INPUTS, scale.triangles, wide).ok()?,
+                colors: match manifest.full_color {
+                    Some(full) => Some((full, shelf.open(COLORS, scale.vertices).ok()?)),
+                    None => None,
+                },
+            },
+        })
+    }
+
+    /// Makes sure that nobody opens the index on a shelf any more: it is about to be made anew.
+    pub fn forget(shelf: &Shelf) {
+        shelf.remove(MANIFEST);
+    }
+}

@@ -1,0 +1,120 @@
+//! Spacing and divergence on disk, with a record of which tiles are done.
+
+use crate::index::Index;
+use crate::store::{Column, Ledger, Shelf, StoreError};
+use crate::tile::Plan;
+use std::hash::Hasher;
+use twox_hash::XxHash3_64;
+
+const LEDGER: &str = "tiles";
+const DIVERGENCE: &str = "divergence";
+/// Records: the side of a tile, the spacing, and behind them the tiles by their number.
+const SIDE: u64 = 0;
+const SPACING: u64 = 1;
+const TILES: u64 = 2;
+
+/// What is known of a survey's curvature.
+#[derive(Debug)]
+pub struct Curvature {
+    /// Divergence by vertex, 1/m; only of tiles that are done.
+    pub divergence: Column<f64>,
+    /// Which these are.
+    pub tiles: TilesDone,
+}
+
+/// Which tiles have their divergence.
+#[derive(Debug)]
+pub struct TilesDone(Ledger);
+
+impl Curvature {
+    pub(super) fn open(shelf: &Shelf, identity: &str, index: &Index) -> Result<Curvature, StoreError> {
+        let (mut ledger, _) = shelf.ledger(LEDGER, identity)?;
+        let divergence = match shelf.open(DIVERGENCE, index.scale.vertices) {
+            Ok(divergence) => divergence,
+            Err(_) => {
+                // Records without their values are worth nothing.
+                drop(ledger);
+                shelf.remove(LEDGER);
+                ledger = shelf.ledger(LEDGER, identity)?.0;
+                shelf.create(DIVERGENCE, index.scale.vertices)?
+            }
+        };
+        Ok(Curvature { divergence, tiles: TilesDone(ledger) })
+    }
+
+    /// The side of the tiles whose records are here, metres; otherwise `side_m`, which it is from now on.
+    ///
+    /// # Errors
+    /// The disk says no.
+    pub fn side_m(&mut self, side_m: f64) -> Result<f64, StoreError> {
+        self.number(SIDE, || Ok::<_, StoreError>(side_m))
+    }
+
+    /// The spacing, metres: the recorded one, or the one that `measure` finds, which is recorded.
+    ///
+    /// # Errors
+    /// Those of `measure`, and the disk's.
+    pub fn spacing_m<E: From<StoreError>>(&mut self, measure: impl FnOnce() -> Result<f64, E>) -> Result<f64, E> {
+        self.number(SPACING, measure)
+    }
+
+    fn number<E: From<StoreError>>(&mut self, key: u64, find: impl FnOnce() -> Result<f64, E>) -> Result<f64, E> {
+        if let Some(position) = self.tiles.0.position(key) {
+            let record = self.tiles.0.read(position)?;
+            if let Ok(bytes) = record.payload.try_into() {
+                return Ok(f64::from_le_bytes(bytes));
+            }
+        }
+        let found = find()?;
+        self.tiles.0.append(key, &found.to_le_bytes())?;
+        Ok(found)
+    }
+
+    /// The tiles of the plan that are not done, by their place in it. Values that do not fit their checksum, as
+    /// after a power cut, are not done.
+    ///
+    /// # Errors
+    /// The disk says no.
+    pub fn missing(&self, index: &Index, plan: &Plan) -> Result<Vec<usize>, StoreError> {
+        let mut missing = Vec::new();
+        for (job, tile) in plan.tiles.iter().enumerate() {
+            let recorded = match self.tiles.0.position(TILES + tile.id) {
+                Some(position) => Some(self.tiles.0.read(position)?.payload),
+                None => None,
+            };
+            let whole = match recorded {
+                Some(payload) => {
+                    let mut values = Vec::new();
+                    for run in index.vertices.ranges(&index.grid, &tile.core) {
+                        self.divergence.read(run, &mut values)?;
+                    }
+                    payload == checksum(&values)
+                }
+                None => false,
+            };
+            if !whole {
+                missing.push(job);
+            }
+        }
+        Ok(missing)
+    }
+}
+
+impl TilesDone {
+    /// Records that the values of a tile, given again here, are written.
+    ///
+    /// # Errors
+    /// The disk says no.
+    pub fn done(&mut self, tile: u64, values: &[f64]) -> Result<(), StoreError> {
+        self.0.append(TILES + tile, &checksum(values)).map(|_| ())
+    }
+}
+
+fn checksum(values: &[f64]) -> [u8; 8] {
+    let mut hash = XxHash3_64::new();
+    for piece in values.chunks(1 << 12) {
+        let bytes: Vec<u8> = piece.iter().flat_map(|v| v.to_le_bytes()).collect();
+        hash.write(&bytes);
+    }
+    hash.finish().to_le_bytes()
+}

@@ -1,0 +1,79 @@
+//! What a run is a run of: everything that its result depends on, name by name.
+
+use crate::open::Reach;
+use crate::settings::Settings;
+use serde_json::{Map, Value};
+
+/// Names and values of what matters to some part of the work.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Identity(Map<String, Value>);
+
+/// A name whose value changed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Change {
+    /// What changed, such as `segment.concave_below`.
+    pub name: String,
+    /// What it was, or nothing.
+    pub was: String,
+    /// What it is, or nothing.
+    pub is: String,
+}
+
+impl Identity {
+    /// Of the surface: the index depends on nothing else.
+    pub(super) fn of_survey(reach: &Reach) -> Identity {
+        let mut names = Map::new();
+        names.insert("program version".into(), env!("CARGO_PKG_VERSION").into());
+        names.insert("number of inputs".into(), reach.files().len().into());
+        for (i, file) in reach.files().iter().enumerate() {
+            names.insert(format!("input {}", i + 1), serde_json::json!(file.fingerprint()));
+        }
+        let frame = reach.frame();
+        names.insert("unit of the input, metres".into(), frame.metres_per_input_unit.to_string().into());
+        names.insert("origin, input units".into(), format!("{:?}", frame.origin_input).into());
+        Identity(names)
+    }
+
+    /// With what the curvature depends on as well.
+    pub(super) fn and_curvature(mut self, settings: &Settings) -> Identity {
+        self.add("curvature", serde_json::json!(settings.curvature));
+        self
+    }
+
+    /// With what the grains of a tile depend on as well.
+    pub(super) fn and_grains(mut self, settings: &Settings, outline_step_m: f64) -> Identity {
+        self.add("segment", serde_json::json!(settings.segment));
+        self.0.insert("output.labelled_mesh".into(), settings.output.labelled_mesh.into());
+        self.0.insert("step of outlines, metres".into(), outline_step_m.to_string().into());
+        self
+    }
+
+    fn add(&mut self, section: &str, values: Value) {
+        if let Value::Object(values) = values {
+            self.0.extend(values.into_iter().map(|(name, value)| (format!("{section}.{name}"), value)));
+        }
+    }
+
+    /// As one line of text, the same for the same values.
+    pub(super) fn text(&self) -> String {
+        Value::Object(self.0.clone()).to_string()
+    }
+
+    /// What the text of an earlier run says otherwise; everything, if it is no such text.
+    pub(super) fn changes_since(&self, earlier: &str) -> Vec<Change> {
+        let earlier: Map<String, Value> = serde_json::from_str(earlier).unwrap_or_default();
+        let names: std::collections::BTreeSet<&String> = earlier.keys().chain(self.0.keys()).collect();
+        let shown = |value: Option<&Value>| value.map_or_else(|| "nothing".to_owned(), Value::to_string);
+        names
+            .into_iter()
+            .filter(|&name| earlier.get(name) != self.0.get(name))
+            .map(|name| Change { name: name.clone(), was: shown(earlier.get(name)), is: shown(self.0.get(name)) })
+            .collect()
+    }
+}
+
+impl std::fmt::Display for Change {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} was {} and is {}", self.name, self.was, self.is)
+    }
+}
