@@ -73,21 +73,28 @@ unsafe fn load_f64(from: *const f64, i: usize) -> __m256d {
     unsafe { _mm256_loadu_pd(from.add(i)) }
 }
 
-/// Squared distance from the origin, or from a box around it.
+/// Squared distance from the origin, or, for [`Lanes::keep_near_box`], from a box around it.
 ///
 /// SAFETY contract: the instructions are there.
 #[inline(always)]
-unsafe fn square(x: __m256, y: __m256, z: __m256, half: Option<[__m256; 3]>) -> __m256 {
+unsafe fn square(x: __m256, y: __m256, z: __m256, half: Option<[__m256; 4]>) -> __m256 {
     // SAFETY: the instructions are there by this function's contract.
     unsafe {
         let (mut x, mut y, mut z) = (x, y, z);
-        if let Some([hx, hy, hz]) = half {
+        if let Some([hx, hy, hz, _]) = half {
             let zero = _mm256_setzero_ps();
             x = _mm256_max_ps(_mm256_sub_ps(_mm256_andnot_ps(_mm256_set1_ps(-0.0), x), hx), zero);
             y = _mm256_max_ps(_mm256_sub_ps(_mm256_andnot_ps(_mm256_set1_ps(-0.0), y), hy), zero);
             z = _mm256_max_ps(_mm256_sub_ps(_mm256_andnot_ps(_mm256_set1_ps(-0.0), z), hz), zero);
         }
-        _mm256_fmadd_ps(x, x, _mm256_fmadd_ps(y, y, _mm256_mul_ps(z, z)))
+        let d2 = _mm256_fmadd_ps(x, x, _mm256_fmadd_ps(y, y, _mm256_mul_ps(z, z)));
+        if let Some([_, _, _, offset]) = half {
+            let most = _mm256_max_ps(_mm256_max_ps(x, y), z);
+            let less = _mm256_max_ps(_mm256_sub_ps(most, offset), _mm256_setzero_ps());
+            _mm256_fmadd_ps(less, less, _mm256_fnmadd_ps(most, most, d2))
+        } else {
+            d2
+        }
     }
 }
 
@@ -95,7 +102,7 @@ unsafe fn square(x: __m256, y: __m256, z: __m256, half: Option<[__m256; 3]>) -> 
 ///
 /// SAFETY contract: the instructions are there.
 #[inline(always)]
-unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], half: Option<[f32; 3]>, limit: f32) {
+unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], half: Option<([f32; 3], f32)>, limit: f32) {
     kept.reserve(all.len);
     assert!(all.fits(all.len) && kept.fits(all.len), "room for the candidates and the slack");
     let (xs, ys, zs, ids) = (all.x.as_ptr(), all.y.as_ptr(), all.z.as_ptr(), all.id.as_ptr());
@@ -105,7 +112,10 @@ unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], half: Option<[
     // slack that was asserted is wider than a vector.
     unsafe {
         let [ox, oy, oz] = origin.map(|o| _mm256_set1_ps(o));
-        let half = half.map(|half| half.map(|h| _mm256_set1_ps(h)));
+        let half = match half {
+            Some(([hx, hy, hz], offset)) => Some([_mm256_set1_ps(hx), _mm256_set1_ps(hy), _mm256_set1_ps(hz), _mm256_set1_ps(offset)]),
+            None => None,
+        };
         let limit = _mm256_set1_ps(limit);
         let mut i = 0;
         while i < all.len {
@@ -226,9 +236,16 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn keep_near_box(self, all: &Points, centre: [f32; 3], half: [f32; 3], limit: f32, kept: &mut Points) {
+    fn keep_near_box(
+        self,
+        all: &Points,
+        centre: [f32; 3],
+        half: [f32; 3],
+        (reach, offset): (f32, f32),
+        kept: &mut Points,
+    ) {
         // SAFETY: `self` proves that the instructions are there.
-        unsafe { keep(all, kept, centre, Some(half), limit) };
+        unsafe { keep(all, kept, centre, Some((half, offset)), reach * reach) };
     }
 
     #[inline(always)]
@@ -271,8 +288,8 @@ impl Lanes for Avx2 {
             let scale = _mm256_set1_ps(places.scale);
             let mut own = [0f32; 8];
             for half in 0..2 {
-                let [[ax0, ax1], [ay0, ay1], [az0, az1], [b0, b1]] =
-                    [&places.a[0], &places.a[1], &places.a[2], &places.b].map(|of| quarters(of, half));
+                let ([ax0, ax1], [ay0, ay1]) = (quarters(&places.a[0], half), quarters(&places.a[1], half));
+            let ([az0, az1], [b0, b1]) = (quarters(&places.a[2], half), quarters(&places.b, half));
                 let mut i = 0;
                 while i < points.len {
                     let (x, y, z) = (load(xs, i), load(ys, i), load(zs, i));
@@ -280,7 +297,7 @@ impl Lanes for Avx2 {
                     _mm256_storeu_ps(own.as_mut_ptr(), _mm256_mul_ps(d2, scale));
                     for j in 0..8.min(points.len - i) {
                         let own = _mm256_set1_ps(own[j]);
-                        let [x, y, z] = [xs, ys, zs].map(|of| _mm256_set1_ps(*of.add(i + j)));
+                        let (x, y, z) = (_mm256_set1_ps(*xs.add(i + j)), _mm256_set1_ps(*ys.add(i + j)), _mm256_set1_ps(*zs.add(i + j)));
                         let rank = |ax, ay, az, b| {
                             let sum = _mm256_fmadd_ps(ay, y, _mm256_fmadd_ps(ax, x, _mm256_add_ps(own, b)));
                             _mm256_cvtps_epi32(_mm256_fmadd_ps(az, z, sum))

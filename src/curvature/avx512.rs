@@ -59,21 +59,28 @@ unsafe fn load_f64(from: *const f64, i: usize) -> __m512d {
     unsafe { _mm512_loadu_pd(from.add(i)) }
 }
 
-/// Squared distance from the origin, or from a box around it.
+/// Squared distance from the origin, or, for [`Lanes::keep_near_box`], from a box around it.
 ///
 /// SAFETY contract: the instructions are there.
 #[inline(always)]
-unsafe fn square(x: __m512, y: __m512, z: __m512, half: Option<[__m512; 3]>) -> __m512 {
+unsafe fn square(x: __m512, y: __m512, z: __m512, half: Option<[__m512; 4]>) -> __m512 {
     // SAFETY: the instructions are there by this function's contract.
     unsafe {
         let (mut x, mut y, mut z) = (x, y, z);
-        if let Some([hx, hy, hz]) = half {
+        if let Some([hx, hy, hz, _]) = half {
             let zero = _mm512_setzero_ps();
             x = _mm512_max_ps(_mm512_sub_ps(_mm512_abs_ps(x), hx), zero);
             y = _mm512_max_ps(_mm512_sub_ps(_mm512_abs_ps(y), hy), zero);
             z = _mm512_max_ps(_mm512_sub_ps(_mm512_abs_ps(z), hz), zero);
         }
-        _mm512_fmadd_ps(x, x, _mm512_fmadd_ps(y, y, _mm512_mul_ps(z, z)))
+        let d2 = _mm512_fmadd_ps(x, x, _mm512_fmadd_ps(y, y, _mm512_mul_ps(z, z)));
+        if let Some([_, _, _, offset]) = half {
+            let most = _mm512_max_ps(_mm512_max_ps(x, y), z);
+            let less = _mm512_max_ps(_mm512_sub_ps(most, offset), _mm512_setzero_ps());
+            _mm512_fmadd_ps(less, less, _mm512_fnmadd_ps(most, most, d2))
+        } else {
+            d2
+        }
     }
 }
 
@@ -81,7 +88,7 @@ unsafe fn square(x: __m512, y: __m512, z: __m512, half: Option<[__m512; 3]>) -> 
 ///
 /// SAFETY contract: the instructions are there.
 #[inline(always)]
-unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], half: Option<[f32; 3]>, limit: f32) {
+unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], half: Option<([f32; 3], f32)>, limit: f32) {
     kept.reserve(all.len);
     assert!(all.fits(all.len) && kept.fits(all.len), "room for the candidates and the slack");
     let (xs, ys, zs, ids) = (all.x.as_ptr(), all.y.as_ptr(), all.z.as_ptr(), all.id.as_ptr());
@@ -91,7 +98,10 @@ unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], half: Option<[
     // slack that was asserted is wider than a vector.
     unsafe {
         let [ox, oy, oz] = origin.map(|o| _mm512_set1_ps(o));
-        let half = half.map(|half| half.map(|h| _mm512_set1_ps(h)));
+        let half = match half {
+            Some(([hx, hy, hz], offset)) => Some([_mm512_set1_ps(hx), _mm512_set1_ps(hy), _mm512_set1_ps(hz), _mm512_set1_ps(offset)]),
+            None => None,
+        };
         let limit = _mm512_set1_ps(limit);
         let mut i = 0;
         while i < all.len {
@@ -182,9 +192,16 @@ impl Lanes for Avx512 {
     }
 
     #[inline(always)]
-    fn keep_near_box(self, all: &Points, centre: [f32; 3], half: [f32; 3], limit: f32, kept: &mut Points) {
+    fn keep_near_box(
+        self,
+        all: &Points,
+        centre: [f32; 3],
+        half: [f32; 3],
+        (reach, offset): (f32, f32),
+        kept: &mut Points,
+    ) {
         // SAFETY: `self` proves that the instructions are there.
-        unsafe { keep(all, kept, centre, Some(half), limit) };
+        unsafe { keep(all, kept, centre, Some((half, offset)), reach * reach) };
     }
 
     #[inline(always)]
@@ -222,8 +239,8 @@ impl Lanes for Avx512 {
         // SAFETY: `self` proves that the instructions are there. `i + j` is below `points.len`, of which there are rows;
         // `i` is too, and the slack wider than a vector.
         unsafe {
-            let [[ax0, ax1], [ay0, ay1], [az0, az1], [b0, b1]] =
-                [&places.a[0], &places.a[1], &places.a[2], &places.b].map(|of| quarters(of));
+            let ([ax0, ax1], [ay0, ay1]) = (quarters(&places.a[0]), quarters(&places.a[1]));
+            let ([az0, az1], [b0, b1]) = (quarters(&places.a[2]), quarters(&places.b));
             let scale = _mm512_set1_ps(places.scale);
             let mut own = [0f32; 16];
             let mut i = 0;
@@ -233,7 +250,7 @@ impl Lanes for Avx512 {
                 _mm512_storeu_ps(own.as_mut_ptr(), _mm512_mul_ps(d2, scale));
                 for j in 0..16.min(points.len - i) {
                     let own = _mm512_set1_ps(own[j]);
-                    let [x, y, z] = [xs, ys, zs].map(|of| _mm512_set1_ps(*of.add(i + j)));
+                    let (x, y, z) = (_mm512_set1_ps(*xs.add(i + j)), _mm512_set1_ps(*ys.add(i + j)), _mm512_set1_ps(*zs.add(i + j)));
                     let rank = |ax, ay, az, b| {
                         let sum = _mm512_fmadd_ps(ay, y, _mm512_fmadd_ps(ax, x, _mm512_add_ps(own, b)));
                         _mm512_cvtps_epi32(_mm512_fmadd_ps(az, z, sum))

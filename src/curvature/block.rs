@@ -44,10 +44,17 @@ impl Group {
         Group { centre, half: half.as_vec3().to_array(), radius_m: half.length() }
     }
 
-    /// Narrows the block to what a ball of this radius around any vertex of the group can hold.
+    /// Narrows the block to what balls around the stencil points of any vertex of the group can hold, whose farthest
+    /// places are `radius_m` from the vertex.
     #[inline(always)]
-    pub(super) fn narrow<L: Lanes>(&self, lanes: L, block: &Points, kept: &mut Points, radius_m: f64) {
-        let limit = (radius_m * 1.000_01) as f32;
-        lanes.keep_near_box(block, self.centre, self.half, limit * limit, kept);
+    pub(super) fn narrow<L: Lanes>(
+        &self,
+        lanes: L,
+        block: &Points,
+        kept: &mut Points,
+        (radius_m, offset_m): (f64, f64),
+    ) {
+        let reach = (radius_m * 1.000_01 - offset_m) as f32;
+        lanes.keep_near_box(block, self.centre, self.half, (reach, offset_m as f32), kept);
     }
 }

@@ -202,7 +202,7 @@ fn together<L: Lanes>(lanes: L, column: &mut Column<'_, '_>, block: &Block, queu
     let mut radius_m = work.radius_m.min(reach_m);
     let mut thresholds = Row([0; LANES]);
     let per_m2 = loop {
-        group.narrow(lanes, &work.block, &mut work.list, radius_m);
+        group.narrow(lanes, &work.block, &mut work.list, (radius_m, offset_m));
         let n = work.list.len;
         if n > MOST || radius_m > 1e3 * job.grid.cell_m {
             return Outcome::Hopeless;
@@ -267,24 +267,35 @@ fn together<L: Lanes>(lanes: L, column: &mut Column<'_, '_>, block: &Block, queu
     Outcome::Known
 }
 
-/// Places the stencil points of vertices, relative to their group's centre; idle lanes do what the first vertex does.
+/// Places the stencil points of vertices, relative to their group's centre; idle lanes do what others do.
 #[inline(always)]
 fn place(places: &mut Places, at: &[DVec3], group: &Group, offset_m: f64, per_m2: f64) {
     let centre = DVec3::from_array(group.centre.map(f64::from));
-    for l in 0..LANES {
-        let v = if l / 6 < at.len() { l / 6 } else { 0 };
-        let p = stencil_point(at[v] - centre, l % 6, offset_m);
+    let (shift, scale) = ((-2.0 * per_m2 * offset_m) as f32, -2.0 * per_m2);
+    for v in 0..TOGETHER {
+        let u = at[if v < at.len() { v } else { 0 }] - centre;
+        let (a, b) = ((u * scale).as_vec3(), per_m2 * (u.length_squared() + offset_m * offset_m));
+        let b_shift = u * (2.0 * per_m2 * offset_m);
         for axis in 0..3 {
-            places.a[axis][l] = (-2.0 * per_m2 * p[axis]) as f32;
+            places.a[axis][6 * v..6 * v + 6].fill(a[axis]);
+            places.a[axis][6 * v + 2 * axis] = a[axis] + shift;
+            places.a[axis][6 * v + 2 * axis + 1] = a[axis] - shift;
+            places.b[6 * v + 2 * axis] = (b + b_shift[axis]) as f32;
+            places.b[6 * v + 2 * axis + 1] = (b - b_shift[axis]) as f32;
         }
-        places.b[l] = (per_m2 * p.length_squared()) as f32;
+    }
+    for l in 6 * TOGETHER..LANES {
+        for axis in 0..3 {
+            places.a[axis][l] = places.a[axis][l % 6];
+        }
+        places.b[l] = places.b[l % 6];
     }
     places.scale = per_m2 as f32;
 }
 
 /// A bound on the error of ranks: coordinates are `f32` relative to cells, so that each difference of two is off by
 /// up to `each`, a distance by sqrt(3) times that, and its square (up to `complete_m`²) by twice that times the
-/// distance. The square is made of terms that add up to `sum`² at most, and rounded twelve times.
+/// distance. The square is made of terms that add up to `sum`² at most, and rounded fourteen times.
 #[inline(always)]
 fn error_in_ranks(job: &Job<'_>, size_m: f64, group: &Group, radius_m: f64, complete_m: f64) -> f64 {
     let ulp = f64::from(f32::EPSILON) / 2.0;
@@ -292,7 +303,7 @@ fn error_in_ranks(job: &Job<'_>, size_m: f64, group: &Group, radius_m: f64, comp
     let each = ulp * 3.0 * (size + radius_m) + 8.0 * f64::EPSILON * (job.grid.magnitude_m() + size);
     let relative = each / complete_m;
     let sum = (2.0 * group.radius_m + radius_m + job.weighting.offset_m) / complete_m;
-    COMPLETE * (relative * (3.5 + 3.0 * relative) + 12.0 * ulp * sum * sum)
+    COMPLETE * (relative * (3.5 + 3.0 * relative) + 14.0 * ulp * sum * sum)
 }
 
 /// Where a stencil point is: +x, -x, +y, -y, +z, -z.

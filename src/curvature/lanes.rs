@@ -92,9 +92,18 @@ pub(super) trait Lanes: Copy + Send + Sync {
     /// Works one column of the search for nearest centroids.
     fn nearest_column(self, column: &mut super::nearest::Column<'_, '_>);
 
-    /// Keeps the candidates no further than sqrt(`limit`) from a box, given by its centre and half sides; their
-    /// coordinates become relative to its centre.
-    fn keep_near_box(self, all: &Points, centre: [f32; 3], half: [f32; 3], limit: f32, kept: &mut Points);
+    /// Keeps the candidates no further than `reach` from some place in a box (given by its centre and half sides) that is
+    /// moved by `offset` along an axis, and perhaps others; their coordinates become relative to the centre. With b
+    /// how far the candidate is from the box along each axis, and the shift along that of the largest b (which gains
+    /// most), the distance is at least that of b with its largest component less by `offset`.
+    fn keep_near_box(
+        self,
+        all: &Points,
+        centre: [f32; 3],
+        half: [f32; 3],
+        reach_and_offset: (f32, f32),
+        kept: &mut Points,
+    );
 
     /// Keeps the candidates no further than sqrt(`limit`) from a point; their coordinates become relative to it.
     fn keep_ball(self, all: &Points, point: [f32; 3], limit: f32, kept: &mut Points);
@@ -175,9 +184,20 @@ impl Lanes for Plain {
     }
 
     #[inline(always)]
-    fn keep_near_box(self, all: &Points, centre: [f32; 3], half: [f32; 3], limit: f32, kept: &mut Points) {
-        let beyond = |x: f32, axis: usize| square(((x - centre[axis]).abs() - half[axis]).max(0.0));
-        keep(all, kept, limit, centre, |x, y, z| beyond(x, 0) + beyond(y, 1) + beyond(z, 2));
+    fn keep_near_box(
+        self,
+        all: &Points,
+        centre: [f32; 3],
+        half: [f32; 3],
+        (reach, offset): (f32, f32),
+        kept: &mut Points,
+    ) {
+        let beyond = |x: f32, axis: usize| ((x - centre[axis]).abs() - half[axis]).max(0.0);
+        keep(all, kept, reach * reach, centre, |x, y, z| {
+            let (x, y, z) = (beyond(x, 0), beyond(y, 1), beyond(z, 2));
+            let most = x.max(y).max(z);
+            square(x) + square(y) + square(z) - square(most) + square((most - offset).max(0.0))
+        });
     }
 
     #[inline(always)]
