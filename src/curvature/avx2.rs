@@ -3,7 +3,7 @@
 #![allow(unsafe_code)]
 
 use super::buffer::Points;
-use super::lanes::{Keys, Lanes, MOST, Near, Places, Row, fetch};
+use super::lanes::{IN_ORDER, Keys, Lanes, MOST, Near, Places, Row, fetch};
 use super::weights::{FIRST, GUESS, ROUND, SECOND, Sum, Weighting, surplus};
 use super::{kernel, nearest};
 use crate::geometry::DVec3;
@@ -37,24 +37,6 @@ fn nearest_column(lanes: Avx2, column: &mut nearest::Column<'_, '_>) {
     nearest::work(lanes, column);
 }
 
-/// For each set of eight lanes, their numbers in order, a byte each.
-static TOGETHER: [u64; 256] = {
-    let mut table = [0; 256];
-    let mut set = 0;
-    while set < 256 {
-        let (mut lane, mut to) = (0, 0);
-        while lane < 8 {
-            if set >> lane & 1 == 1 {
-                table[set] |= (lane as u64) << (8 * to);
-                to += 1;
-            }
-            lane += 1;
-        }
-        set += 1;
-    }
-    table
-};
-
 /// Eight numbers from `i` on.
 ///
 /// SAFETY contract: AVX is there, and so are the numbers.
@@ -73,36 +55,29 @@ unsafe fn load_f64(from: *const f64, i: usize) -> __m256d {
     unsafe { _mm256_loadu_pd(from.add(i)) }
 }
 
-/// Squared distance from the origin, or, for [`Lanes::keep_near_box`], from a box around it.
+/// Squared distance as [`Lanes::keep_near_box`] has it, from a box around the origin.
 ///
 /// SAFETY contract: the instructions are there.
 #[inline(always)]
-unsafe fn square(x: __m256, y: __m256, z: __m256, half: Option<[__m256; 4]>) -> __m256 {
+unsafe fn square(x: __m256, y: __m256, z: __m256, [hx, hy, hz, offset]: [__m256; 4]) -> __m256 {
     // SAFETY: the instructions are there by this function's contract.
     unsafe {
-        let (mut x, mut y, mut z) = (x, y, z);
-        if let Some([hx, hy, hz, _]) = half {
-            let zero = _mm256_setzero_ps();
-            x = _mm256_max_ps(_mm256_sub_ps(_mm256_andnot_ps(_mm256_set1_ps(-0.0), x), hx), zero);
-            y = _mm256_max_ps(_mm256_sub_ps(_mm256_andnot_ps(_mm256_set1_ps(-0.0), y), hy), zero);
-            z = _mm256_max_ps(_mm256_sub_ps(_mm256_andnot_ps(_mm256_set1_ps(-0.0), z), hz), zero);
-        }
+        let zero = _mm256_setzero_ps();
+        let x = _mm256_max_ps(_mm256_sub_ps(_mm256_andnot_ps(_mm256_set1_ps(-0.0), x), hx), zero);
+        let y = _mm256_max_ps(_mm256_sub_ps(_mm256_andnot_ps(_mm256_set1_ps(-0.0), y), hy), zero);
+        let z = _mm256_max_ps(_mm256_sub_ps(_mm256_andnot_ps(_mm256_set1_ps(-0.0), z), hz), zero);
         let d2 = _mm256_fmadd_ps(x, x, _mm256_fmadd_ps(y, y, _mm256_mul_ps(z, z)));
-        if let Some([_, _, _, offset]) = half {
-            let most = _mm256_max_ps(_mm256_max_ps(x, y), z);
-            let less = _mm256_max_ps(_mm256_sub_ps(most, offset), _mm256_setzero_ps());
-            _mm256_fmadd_ps(less, less, _mm256_fnmadd_ps(most, most, d2))
-        } else {
-            d2
-        }
+        let most = _mm256_max_ps(_mm256_max_ps(x, y), z);
+        let less = _mm256_max_ps(_mm256_sub_ps(most, offset), _mm256_setzero_ps());
+        _mm256_fmadd_ps(less, less, _mm256_fnmadd_ps(most, most, d2))
     }
 }
 
-/// Keeps the candidates within sqrt(`limit`) of a point, or of a box around it, and makes them relative to it.
+/// [`Lanes::keep_near_box`].
 ///
 /// SAFETY contract: the instructions are there.
 #[inline(always)]
-unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], half: Option<([f32; 3], f32)>, limit: f32) {
+unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], half: [f32; 3], (reach, offset): (f32, f32)) {
     kept.reserve(all.len);
     assert!(all.fits(all.len) && kept.fits(all.len), "room for the candidates and the slack");
     let (xs, ys, zs, ids) = (all.x.as_ptr(), all.y.as_ptr(), all.z.as_ptr(), all.id.as_ptr());
@@ -112,11 +87,9 @@ unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], half: Option<(
     // slack that was asserted is wider than a vector.
     unsafe {
         let [ox, oy, oz] = origin.map(|o| _mm256_set1_ps(o));
-        let half = match half {
-            Some(([hx, hy, hz], offset)) => Some([_mm256_set1_ps(hx), _mm256_set1_ps(hy), _mm256_set1_ps(hz), _mm256_set1_ps(offset)]),
-            None => None,
-        };
-        let limit = _mm256_set1_ps(limit);
+        let [hx, hy, hz] = half.map(|h| _mm256_set1_ps(h));
+        let half = [hx, hy, hz, _mm256_set1_ps(offset)];
+        let limit = _mm256_set1_ps(reach * reach);
         let mut i = 0;
         while i < all.len {
             let x = _mm256_sub_ps(load(xs, i), ox);
@@ -127,7 +100,7 @@ unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], half: Option<(
                 mask &= (1 << (all.len - i)) - 1;
             }
             if mask != 0 {
-                let order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(TOGETHER[mask] as i64));
+                let order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(IN_ORDER[mask] as i64));
                 _mm256_storeu_ps(kx.add(n), _mm256_permutevar8x32_ps(x, order));
                 _mm256_storeu_ps(ky.add(n), _mm256_permutevar8x32_ps(y, order));
                 _mm256_storeu_ps(kz.add(n), _mm256_permutevar8x32_ps(z, order));
@@ -245,36 +218,7 @@ impl Lanes for Avx2 {
         kept: &mut Points,
     ) {
         // SAFETY: `self` proves that the instructions are there.
-        unsafe { keep(all, kept, centre, Some((half, offset)), reach * reach) };
-    }
-
-    #[inline(always)]
-    fn keep_ball(self, all: &Points, point: [f32; 3], limit: f32, kept: &mut Points) {
-        // SAFETY: `self` proves that the instructions are there.
-        unsafe { keep(all, kept, point, None, limit) };
-    }
-
-    #[inline(always)]
-    fn least(self, all: &Points, point: [f32; 3]) -> f32 {
-        let mut lanes = [0f32; 8];
-        assert!(all.fits(all.len), "room for the candidates and the slack");
-        let (xs, ys, zs) = (all.x.as_ptr(), all.y.as_ptr(), all.z.as_ptr());
-        // SAFETY: `self` proves that the instructions are there; `i` is below `all.len`, and the slack wider than a
-        // vector. Blocks are padded with far points.
-        unsafe {
-            let [px, py, pz] = point.map(|p| _mm256_set1_ps(p));
-            let mut least = _mm256_set1_ps(f32::INFINITY);
-            let mut i = 0;
-            while i < all.len {
-                let x = _mm256_sub_ps(load(xs, i), px);
-                let y = _mm256_sub_ps(load(ys, i), py);
-                let z = _mm256_sub_ps(load(zs, i), pz);
-                least = _mm256_min_ps(_mm256_fmadd_ps(x, x, _mm256_fmadd_ps(y, y, _mm256_mul_ps(z, z))), least);
-                i += 8;
-            }
-            _mm256_storeu_ps(lanes.as_mut_ptr(), least);
-        }
-        lanes.into_iter().fold(f32::INFINITY, |a, b| if b < a { b } else { a })
+        unsafe { keep(all, kept, centre, half, (reach, offset)) };
     }
 
     #[inline(always)]
@@ -289,7 +233,7 @@ impl Lanes for Avx2 {
             let mut own = [0f32; 8];
             for half in 0..2 {
                 let ([ax0, ax1], [ay0, ay1]) = (quarters(&places.a[0], half), quarters(&places.a[1], half));
-            let ([az0, az1], [b0, b1]) = (quarters(&places.a[2], half), quarters(&places.b, half));
+                let ([az0, az1], [b0, b1]) = (quarters(&places.a[2], half), quarters(&places.b, half));
                 let mut i = 0;
                 while i < points.len {
                     let (x, y, z) = (load(xs, i), load(ys, i), load(zs, i));
@@ -297,7 +241,11 @@ impl Lanes for Avx2 {
                     _mm256_storeu_ps(own.as_mut_ptr(), _mm256_mul_ps(d2, scale));
                     for j in 0..8.min(points.len - i) {
                         let own = _mm256_set1_ps(own[j]);
-                        let (x, y, z) = (_mm256_set1_ps(*xs.add(i + j)), _mm256_set1_ps(*ys.add(i + j)), _mm256_set1_ps(*zs.add(i + j)));
+                        let (x, y, z) = (
+                            _mm256_set1_ps(*xs.add(i + j)),
+                            _mm256_set1_ps(*ys.add(i + j)),
+                            _mm256_set1_ps(*zs.add(i + j)),
+                        );
                         let rank = |ax, ay, az, b| {
                             let sum = _mm256_fmadd_ps(ay, y, _mm256_fmadd_ps(ax, x, _mm256_add_ps(own, b)));
                             _mm256_cvtps_epi32(_mm256_fmadd_ps(az, z, sum))
@@ -380,7 +328,7 @@ impl Lanes for Avx2 {
                 let of = _mm256_loadu_si256(of.add(i).cast());
                 let none = _mm256_cmpeq_epi32(_mm256_and_si256(of, bits), _mm256_setzero_si256());
                 let mask = (!_mm256_movemask_ps(_mm256_castsi256_ps(none)) & 255) as usize;
-                let order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(TOGETHER[mask] as i64));
+                let order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(IN_ORDER[mask] as i64));
                 let id = _mm256_permutevar8x32_epi32(_mm256_loadu_si256(ids.add(i).cast()), order);
                 _mm256_storeu_si256(to_id.add(n).cast(), id);
                 _mm256_storeu_si256(to_of.add(n).cast(), _mm256_permutevar8x32_epi32(of, order));
@@ -399,7 +347,10 @@ impl Lanes for Avx2 {
     #[inline(always)]
     fn sums(self, near: &Near, weighting: &Weighting, neighbours: usize) -> [Sum; 6] {
         let mut result = [Sum::default(); 6];
-        assert!(near.len <= MOST && near.value.len() >= 6 * MOST && near.of.len() >= MOST, "whole vectors of neighbours");
+        assert!(
+            near.len <= MOST && near.value.len() >= 6 * MOST && near.of.len() >= MOST,
+            "whole vectors of neighbours"
+        );
         let value = near.value.as_ptr();
         // SAFETY: `self` proves that the instructions are there; `i` is below `near.len`, and `MOST` a multiple of the
         // lanes.

@@ -59,36 +59,29 @@ unsafe fn load_f64(from: *const f64, i: usize) -> __m512d {
     unsafe { _mm512_loadu_pd(from.add(i)) }
 }
 
-/// Squared distance from the origin, or, for [`Lanes::keep_near_box`], from a box around it.
+/// Squared distance as [`Lanes::keep_near_box`] has it, from a box around the origin.
 ///
 /// SAFETY contract: the instructions are there.
 #[inline(always)]
-unsafe fn square(x: __m512, y: __m512, z: __m512, half: Option<[__m512; 4]>) -> __m512 {
+unsafe fn square(x: __m512, y: __m512, z: __m512, [hx, hy, hz, offset]: [__m512; 4]) -> __m512 {
     // SAFETY: the instructions are there by this function's contract.
     unsafe {
-        let (mut x, mut y, mut z) = (x, y, z);
-        if let Some([hx, hy, hz, _]) = half {
-            let zero = _mm512_setzero_ps();
-            x = _mm512_max_ps(_mm512_sub_ps(_mm512_abs_ps(x), hx), zero);
-            y = _mm512_max_ps(_mm512_sub_ps(_mm512_abs_ps(y), hy), zero);
-            z = _mm512_max_ps(_mm512_sub_ps(_mm512_abs_ps(z), hz), zero);
-        }
+        let zero = _mm512_setzero_ps();
+        let x = _mm512_max_ps(_mm512_sub_ps(_mm512_abs_ps(x), hx), zero);
+        let y = _mm512_max_ps(_mm512_sub_ps(_mm512_abs_ps(y), hy), zero);
+        let z = _mm512_max_ps(_mm512_sub_ps(_mm512_abs_ps(z), hz), zero);
         let d2 = _mm512_fmadd_ps(x, x, _mm512_fmadd_ps(y, y, _mm512_mul_ps(z, z)));
-        if let Some([_, _, _, offset]) = half {
-            let most = _mm512_max_ps(_mm512_max_ps(x, y), z);
-            let less = _mm512_max_ps(_mm512_sub_ps(most, offset), _mm512_setzero_ps());
-            _mm512_fmadd_ps(less, less, _mm512_fnmadd_ps(most, most, d2))
-        } else {
-            d2
-        }
+        let most = _mm512_max_ps(_mm512_max_ps(x, y), z);
+        let less = _mm512_max_ps(_mm512_sub_ps(most, offset), _mm512_setzero_ps());
+        _mm512_fmadd_ps(less, less, _mm512_fnmadd_ps(most, most, d2))
     }
 }
 
-/// Keeps the candidates within sqrt(`limit`) of a point, or of a box around it, and makes them relative to it.
+/// [`Lanes::keep_near_box`].
 ///
 /// SAFETY contract: the instructions are there.
 #[inline(always)]
-unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], half: Option<([f32; 3], f32)>, limit: f32) {
+unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], half: [f32; 3], (reach, offset): (f32, f32)) {
     kept.reserve(all.len);
     assert!(all.fits(all.len) && kept.fits(all.len), "room for the candidates and the slack");
     let (xs, ys, zs, ids) = (all.x.as_ptr(), all.y.as_ptr(), all.z.as_ptr(), all.id.as_ptr());
@@ -98,11 +91,9 @@ unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], half: Option<(
     // slack that was asserted is wider than a vector.
     unsafe {
         let [ox, oy, oz] = origin.map(|o| _mm512_set1_ps(o));
-        let half = match half {
-            Some(([hx, hy, hz], offset)) => Some([_mm512_set1_ps(hx), _mm512_set1_ps(hy), _mm512_set1_ps(hz), _mm512_set1_ps(offset)]),
-            None => None,
-        };
-        let limit = _mm512_set1_ps(limit);
+        let [hx, hy, hz] = half.map(|h| _mm512_set1_ps(h));
+        let half = [hx, hy, hz, _mm512_set1_ps(offset)];
+        let limit = _mm512_set1_ps(reach * reach);
         let mut i = 0;
         while i < all.len {
             let x = _mm512_sub_ps(load(xs, i), ox);
@@ -201,34 +192,7 @@ impl Lanes for Avx512 {
         kept: &mut Points,
     ) {
         // SAFETY: `self` proves that the instructions are there.
-        unsafe { keep(all, kept, centre, Some((half, offset)), reach * reach) };
-    }
-
-    #[inline(always)]
-    fn keep_ball(self, all: &Points, point: [f32; 3], limit: f32, kept: &mut Points) {
-        // SAFETY: `self` proves that the instructions are there.
-        unsafe { keep(all, kept, point, None, limit) };
-    }
-
-    #[inline(always)]
-    fn least(self, all: &Points, point: [f32; 3]) -> f32 {
-        assert!(all.fits(all.len), "room for the candidates and the slack");
-        let (xs, ys, zs) = (all.x.as_ptr(), all.y.as_ptr(), all.z.as_ptr());
-        // SAFETY: `self` proves that the instructions are there; `i` is below `all.len`, and the slack wider than a
-        // vector. Blocks are padded with far points.
-        unsafe {
-            let [px, py, pz] = point.map(|p| _mm512_set1_ps(p));
-            let mut least = _mm512_set1_ps(f32::INFINITY);
-            let mut i = 0;
-            while i < all.len {
-                let x = _mm512_sub_ps(load(xs, i), px);
-                let y = _mm512_sub_ps(load(ys, i), py);
-                let z = _mm512_sub_ps(load(zs, i), pz);
-                least = _mm512_min_ps(_mm512_fmadd_ps(x, x, _mm512_fmadd_ps(y, y, _mm512_mul_ps(z, z))), least);
-                i += 16;
-            }
-            _mm512_reduce_min_ps(least)
-        }
+        unsafe { keep(all, kept, centre, half, (reach, offset)) };
     }
 
     #[inline(always)]
@@ -250,7 +214,11 @@ impl Lanes for Avx512 {
                 _mm512_storeu_ps(own.as_mut_ptr(), _mm512_mul_ps(d2, scale));
                 for j in 0..16.min(points.len - i) {
                     let own = _mm512_set1_ps(own[j]);
-                    let (x, y, z) = (_mm512_set1_ps(*xs.add(i + j)), _mm512_set1_ps(*ys.add(i + j)), _mm512_set1_ps(*zs.add(i + j)));
+                    let (x, y, z) = (
+                        _mm512_set1_ps(*xs.add(i + j)),
+                        _mm512_set1_ps(*ys.add(i + j)),
+                        _mm512_set1_ps(*zs.add(i + j)),
+                    );
                     let rank = |ax, ay, az, b| {
                         let sum = _mm512_fmadd_ps(ay, y, _mm512_fmadd_ps(ax, x, _mm512_add_ps(own, b)));
                         _mm512_cvtps_epi32(_mm512_fmadd_ps(az, z, sum))
@@ -364,7 +332,10 @@ impl Lanes for Avx512 {
 
     #[inline(always)]
     fn sums(self, near: &Near, weighting: &Weighting, neighbours: usize) -> [Sum; 6] {
-        assert!(near.len <= MOST && near.value.len() >= 6 * MOST && near.of.len() >= MOST, "whole vectors of neighbours");
+        assert!(
+            near.len <= MOST && near.value.len() >= 6 * MOST && near.of.len() >= MOST,
+            "whole vectors of neighbours"
+        );
         let value = near.value.as_ptr();
         // SAFETY: `self` proves that the instructions are there; `i` is below `near.len`, and `MOST` a multiple of the
         // lanes.

@@ -84,6 +84,24 @@ impl Near {
     }
 }
 
+/// For each set of eight lanes, their numbers in order, a byte each.
+pub(super) static IN_ORDER: [u64; 256] = {
+    let mut table = [0; 256];
+    let mut set = 0;
+    while set < 256 {
+        let (mut lane, mut to) = (0, 0);
+        while lane < 8 {
+            if set >> lane & 1 == 1 {
+                table[set] |= (lane as u64) << (8 * to);
+                to += 1;
+            }
+            lane += 1;
+        }
+        set += 1;
+    }
+    table
+};
+
 /// A vector instruction set, known to be there.
 pub(super) trait Lanes: Copy + Send + Sync {
     /// Works one column of vertices compiled for this instruction set.
@@ -104,12 +122,6 @@ pub(super) trait Lanes: Copy + Send + Sync {
         reach_and_offset: (f32, f32),
         kept: &mut Points,
     );
-
-    /// Keeps the candidates no further than sqrt(`limit`) from a point; their coordinates become relative to it.
-    fn keep_ball(self, all: &Points, point: [f32; 3], limit: f32, kept: &mut Points);
-
-    /// Least squared distance from the point.
-    fn least(self, all: &Points, point: [f32; 3]) -> f32;
 
     /// Ranks candidates (`MOST` at most) at the stencil points; none may rank 2^31.
     fn rank(self, points: &Points, places: &Places, keys: &mut Keys);
@@ -174,6 +186,25 @@ pub(super) fn fetch(field: &NormalField, vertex: DVec3, near: &mut Near) {
     }
 }
 
+impl Plain {
+    /// Keeps the candidates no further than sqrt(`limit`) from a point; their coordinates become relative to it.
+    #[inline(always)]
+    pub(super) fn keep_ball(self, all: &Points, p: [f32; 3], limit: f32, kept: &mut Points) {
+        keep(all, kept, limit, p, |x, y, z| square(x - p[0]) + square(y - p[1]) + square(z - p[2]));
+    }
+
+    /// Least squared distance from the point.
+    #[inline(always)]
+    pub(super) fn least(self, all: &Points, p: [f32; 3]) -> f32 {
+        let mut least = f32::INFINITY;
+        for ((x, y), z) in all.x[..all.len].iter().zip(&all.y[..all.len]).zip(&all.z[..all.len]) {
+            let d2 = square(x - p[0]) + square(y - p[1]) + square(z - p[2]);
+            least = if d2 < least { d2 } else { least };
+        }
+        least
+    }
+}
+
 impl Lanes for Plain {
     fn column(self, column: &mut super::kernel::Column<'_, '_>) {
         super::kernel::work(self, column);
@@ -198,21 +229,6 @@ impl Lanes for Plain {
             let most = x.max(y).max(z);
             square(x) + square(y) + square(z) - square(most) + square((most - offset).max(0.0))
         });
-    }
-
-    #[inline(always)]
-    fn keep_ball(self, all: &Points, p: [f32; 3], limit: f32, kept: &mut Points) {
-        keep(all, kept, limit, p, |x, y, z| square(x - p[0]) + square(y - p[1]) + square(z - p[2]));
-    }
-
-    #[inline(always)]
-    fn least(self, all: &Points, p: [f32; 3]) -> f32 {
-        let mut least = f32::INFINITY;
-        for ((x, y), z) in all.x[..all.len].iter().zip(&all.y[..all.len]).zip(&all.z[..all.len]) {
-            let d2 = square(x - p[0]) + square(y - p[1]) + square(z - p[2]);
-            least = if d2 < least { d2 } else { least };
-        }
-        least
     }
 
     #[inline(always)]

@@ -39,11 +39,8 @@ pub(super) fn search<L: Lanes>(lanes: L, keys: &Keys, k: i32, at: &mut Row) -> b
     for round in 1.. {
         let bisect = u32::is_multiple_of(round, 5);
         // Counts stay the same down to the rank below and up to the rank above.
-        let (counts, below, above) = if round <= COUNTING {
-            (lanes.count(keys, at), *at, *at)
-        } else {
-            lanes.count_between(keys, at)
-        };
+        let (counts, below, above) =
+            if round <= COUNTING { (lanes.count(keys, at), *at, *at) } else { lanes.count_between(keys, at) };
         let one_by_one = if round <= COUNTING { 0 } else { 2 };
         let (mut open, mut lacking) = (0, 0);
         for q in 0..LANES {
