@@ -2,9 +2,8 @@
 #![allow(clippy::needless_range_loop, reason = "stencil points and axes run through several arrays at once")]
 #![allow(unsafe_code)]
 
-use super::buffer::{Points, SLACK};
-use super::lanes::{Keys, Lanes, MOST, Near, Set, choose, fetch};
-use super::thresholds::Thresholds;
+use super::buffer::Points;
+use super::lanes::{IN_ORDER, Keys, Lanes, MOST, Near, Places, Row, fetch};
 use super::weights::{FIRST, GUESS, ROUND, SECOND, Sum, Weighting, surplus};
 use super::{kernel, nearest};
 use crate::geometry::DVec3;
@@ -38,24 +37,6 @@ fn nearest_column(lanes: Avx2, column: &mut nearest::Column<'_, '_>) {
     nearest::work(lanes, column);
 }
 
-/// For each set of eight lanes, their numbers in order, a byte each.
-static TOGETHER: [u64; 256] = {
-    let mut table = [0; 256];
-    let mut set = 0;
-    while set < 256 {
-        let (mut lane, mut to) = (0, 0);
-        while lane < 8 {
-            if set >> lane & 1 == 1 {
-                table[set] |= (lane as u64) << (8 * to);
-                to += 1;
-            }
-            lane += 1;
-        }
-        set += 1;
-    }
-    table
-};
-
 /// Eight numbers from `i` on.
 ///
 /// SAFETY contract: AVX is there, and so are the numbers.
@@ -63,15 +44,6 @@ static TOGETHER: [u64; 256] = {
 unsafe fn load(from: *const f32, i: usize) -> __m256 {
     // SAFETY: by this function's contract.
     unsafe { _mm256_loadu_ps(from.add(i)) }
-}
-
-/// Sixteen ranks from `i` on.
-///
-/// SAFETY contract: AVX is there, and so are the ranks.
-#[inline(always)]
-unsafe fn load_ranks(from: *const u16, i: usize) -> __m256i {
-    // SAFETY: by this function's contract.
-    unsafe { _mm256_loadu_si256(from.add(i).cast()) }
 }
 
 /// Four numbers from `i` on.
@@ -83,11 +55,29 @@ unsafe fn load_f64(from: *const f64, i: usize) -> __m256d {
     unsafe { _mm256_loadu_pd(from.add(i)) }
 }
 
-/// Keeps the candidates that `near` accepts, less `origin`.
+/// Squared distance as [`Lanes::keep_near_box`] has it, from a box around the origin.
 ///
 /// SAFETY contract: the instructions are there.
 #[inline(always)]
-unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], near: impl Fn(__m256, __m256, __m256) -> __m256) {
+unsafe fn square(x: __m256, y: __m256, z: __m256, [hx, hy, hz, offset]: [__m256; 4]) -> __m256 {
+    // SAFETY: the instructions are there by this function's contract.
+    unsafe {
+        let zero = _mm256_setzero_ps();
+        let x = _mm256_max_ps(_mm256_sub_ps(_mm256_andnot_ps(_mm256_set1_ps(-0.0), x), hx), zero);
+        let y = _mm256_max_ps(_mm256_sub_ps(_mm256_andnot_ps(_mm256_set1_ps(-0.0), y), hy), zero);
+        let z = _mm256_max_ps(_mm256_sub_ps(_mm256_andnot_ps(_mm256_set1_ps(-0.0), z), hz), zero);
+        let d2 = _mm256_fmadd_ps(x, x, _mm256_fmadd_ps(y, y, _mm256_mul_ps(z, z)));
+        let most = _mm256_max_ps(_mm256_max_ps(x, y), z);
+        let less = _mm256_max_ps(_mm256_sub_ps(most, offset), _mm256_setzero_ps());
+        _mm256_fmadd_ps(less, less, _mm256_fnmadd_ps(most, most, d2))
+    }
+}
+
+/// [`Lanes::keep_near_box`].
+///
+/// SAFETY contract: the instructions are there.
+#[inline(always)]
+unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], half: [f32; 3], (reach, offset): (f32, f32)) {
     kept.reserve(all.len);
     assert!(all.fits(all.len) && kept.fits(all.len), "room for the candidates and the slack");
     let (xs, ys, zs, ids) = (all.x.as_ptr(), all.y.as_ptr(), all.z.as_ptr(), all.id.as_ptr());
@@ -97,17 +87,20 @@ unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], near: impl Fn(
     // slack that was asserted is wider than a vector.
     unsafe {
         let [ox, oy, oz] = origin.map(|o| _mm256_set1_ps(o));
+        let [hx, hy, hz] = half.map(|h| _mm256_set1_ps(h));
+        let half = [hx, hy, hz, _mm256_set1_ps(offset)];
+        let limit = _mm256_set1_ps(reach * reach);
         let mut i = 0;
         while i < all.len {
             let x = _mm256_sub_ps(load(xs, i), ox);
             let y = _mm256_sub_ps(load(ys, i), oy);
             let z = _mm256_sub_ps(load(zs, i), oz);
-            let mut mask = _mm256_movemask_ps(near(x, y, z)) as usize;
+            let mut mask = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(square(x, y, z, half), limit)) as usize;
             if all.len - i < 8 {
                 mask &= (1 << (all.len - i)) - 1;
             }
             if mask != 0 {
-                let order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(TOGETHER[mask] as i64));
+                let order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(IN_ORDER[mask] as i64));
                 _mm256_storeu_ps(kx.add(n), _mm256_permutevar8x32_ps(x, order));
                 _mm256_storeu_ps(ky.add(n), _mm256_permutevar8x32_ps(y, order));
                 _mm256_storeu_ps(kz.add(n), _mm256_permutevar8x32_ps(z, order));
@@ -121,52 +114,53 @@ unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], near: impl Fn(
     kept.len = n;
 }
 
-/// Which of 32 ranks from `i` on do not exceed the threshold, whose lanes are all alike. Lanes in order if `ORDERED`.
+/// A row as two vectors.
 ///
-/// SAFETY contract: the instructions are there.
+/// SAFETY contract: AVX is there.
 #[inline(always)]
-unsafe fn below<const ORDERED: bool>(ranks: *const u16, i: usize, threshold: __m256i) -> u32 {
-    // SAFETY: the instructions are there by this function's contract.
+unsafe fn load_row(row: &Row) -> [__m256i; 2] {
+    let from = row.0.as_ptr().cast::<__m256i>();
+    // SAFETY: by this function's contract; a row is 64 bytes, aligned.
+    unsafe { [_mm256_load_si256(from), _mm256_load_si256(from.add(1))] }
+}
+
+/// Two vectors as a row.
+///
+/// SAFETY contract: AVX is there.
+#[inline(always)]
+unsafe fn row(lanes: [__m256i; 2]) -> Row {
+    let mut row = Row([0; 32]);
+    let to = row.0.as_mut_ptr().cast::<__m256i>();
+    // SAFETY: by this function's contract; a row is 64 bytes, aligned.
     unsafe {
-        let (first, second) = (load_ranks(ranks, i), load_ranks(ranks, i + 16));
-        let first = _mm256_cmpeq_epi16(_mm256_min_epu16(first, threshold), first);
-        let second = _mm256_cmpeq_epi16(_mm256_min_epu16(second, threshold), second);
-        let packed = _mm256_packs_epi16(first, second);
-        let packed = if ORDERED { _mm256_permute4x64_epi64::<0b11_01_10_00>(packed) } else { packed };
+        _mm256_store_si256(to, lanes[0]);
+        _mm256_store_si256(to.add(1), lanes[1]);
+    }
+    row
+}
+
+/// One bit for each rank of a row, set where all bits of the rank's lane are.
+///
+/// SAFETY contract: AVX2 is there.
+#[inline(always)]
+unsafe fn bits(lanes: [__m256i; 2]) -> u32 {
+    // SAFETY: by this function's contract.
+    unsafe {
+        // Packing works within halves of a vector; this puts their parts in order.
+        let packed = _mm256_permute4x64_epi64::<0b11_01_10_00>(_mm256_packs_epi16(lanes[0], lanes[1]));
         _mm256_movemask_epi8(packed) as u32
     }
 }
 
-/// Ranks of candidates at the six stencil points, in 32 bits.
+/// Half of 32 numbers, every other four of them in a vector: packing two vectors puts them in order again.
 ///
-/// SAFETY contract: the instructions are there.
+/// SAFETY contract: AVX is there.
 #[inline(always)]
-unsafe fn ranks(points: &Points, i: usize, offset: __m256, scale: __m256) -> [__m256i; 6] {
-    // SAFETY: the instructions are there by this function's contract.
+unsafe fn quarters(of: &[f32; 32], half: usize) -> [__m256; 2] {
+    // SAFETY: by this function's contract; `half` is 0 or 1.
     unsafe {
-        let (x, y, z) = (load(points.x.as_ptr(), i), load(points.y.as_ptr(), i), load(points.z.as_ptr(), i));
-        let (x2, y2, z2) = (_mm256_mul_ps(x, x), _mm256_mul_ps(y, y), _mm256_mul_ps(z, z));
-        let (yz, zx, xy) = (_mm256_add_ps(y2, z2), _mm256_add_ps(z2, x2), _mm256_add_ps(x2, y2));
-        [
-            rank(_mm256_sub_ps(x, offset), yz, scale),
-            rank(_mm256_add_ps(x, offset), yz, scale),
-            rank(_mm256_sub_ps(y, offset), zx, scale),
-            rank(_mm256_add_ps(y, offset), zx, scale),
-            rank(_mm256_sub_ps(z, offset), xy, scale),
-            rank(_mm256_add_ps(z, offset), xy, scale),
-        ]
-    }
-}
-
-/// The floor of `scale` times (a² + rest), 65535 at most.
-///
-/// SAFETY contract: the instructions are there.
-#[inline(always)]
-unsafe fn rank(a: __m256, rest: __m256, scale: __m256) -> __m256i {
-    // SAFETY: the instructions are there by this function's contract.
-    unsafe {
-        let d2 = _mm256_mul_ps(_mm256_fmadd_ps(a, a, rest), scale);
-        _mm256_cvttps_epi32(_mm256_min_ps(d2, _mm256_set1_ps(65535.0)))
+        let (a, b) = (load(of.as_ptr(), 16 * half), load(of.as_ptr(), 16 * half + 8));
+        [_mm256_permute2f128_ps::<0x20>(a, b), _mm256_permute2f128_ps::<0x31>(a, b)]
     }
 }
 
@@ -215,130 +209,134 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn keep_near_box(self, all: &Points, centre: [f32; 3], half: [f32; 3], limit: f32, kept: &mut Points) {
+    fn keep_near_box(
+        self,
+        all: &Points,
+        centre: [f32; 3],
+        half: [f32; 3],
+        (reach, offset): (f32, f32),
+        kept: &mut Points,
+    ) {
         // SAFETY: `self` proves that the instructions are there.
+        unsafe { keep(all, kept, centre, half, (reach, offset)) };
+    }
+
+    #[inline(always)]
+    fn rank(self, points: &Points, places: &Places, keys: &mut Keys) {
+        assert!(points.fits(points.len), "room for the candidates and the slack");
+        let rows = keys.start(points.len).as_mut_ptr();
+        let (xs, ys, zs) = (points.x.as_ptr(), points.y.as_ptr(), points.z.as_ptr());
+        // SAFETY: `self` proves that the instructions are there. `i + j` is below `points.len`, of which there are rows;
+        // `i` is too, and the slack wider than a vector. A row is two vectors.
         unsafe {
-            let ([cx, cy, cz], [hx, hy, hz]) = (centre.map(|c| _mm256_set1_ps(c)), half.map(|h| _mm256_set1_ps(h)));
-            let (limit, sign) = (_mm256_set1_ps(limit), _mm256_set1_ps(-0.0));
-            let beyond = |x, c, h| {
-                let far = _mm256_andnot_ps(sign, _mm256_sub_ps(x, c));
-                _mm256_max_ps(_mm256_sub_ps(far, h), _mm256_setzero_ps())
-            };
-            keep(all, kept, [0.0; 3], |x, y, z| {
-                let (x, y, z) = (beyond(x, cx, hx), beyond(y, cy, hy), beyond(z, cz, hz));
-                let d2 = _mm256_fmadd_ps(x, x, _mm256_fmadd_ps(y, y, _mm256_mul_ps(z, z)));
-                _mm256_cmp_ps::<_CMP_LE_OQ>(d2, limit)
-            });
+            let scale = _mm256_set1_ps(places.scale);
+            let mut own = [0f32; 8];
+            for half in 0..2 {
+                let ([ax0, ax1], [ay0, ay1]) = (quarters(&places.a[0], half), quarters(&places.a[1], half));
+                let ([az0, az1], [b0, b1]) = (quarters(&places.a[2], half), quarters(&places.b, half));
+                let mut i = 0;
+                while i < points.len {
+                    let (x, y, z) = (load(xs, i), load(ys, i), load(zs, i));
+                    let d2 = _mm256_fmadd_ps(x, x, _mm256_fmadd_ps(y, y, _mm256_mul_ps(z, z)));
+                    _mm256_storeu_ps(own.as_mut_ptr(), _mm256_mul_ps(d2, scale));
+                    for j in 0..8.min(points.len - i) {
+                        let own = _mm256_set1_ps(own[j]);
+                        let (x, y, z) = (
+                            _mm256_set1_ps(*xs.add(i + j)),
+                            _mm256_set1_ps(*ys.add(i + j)),
+                            _mm256_set1_ps(*zs.add(i + j)),
+                        );
+                        let rank = |ax, ay, az, b| {
+                            let sum = _mm256_fmadd_ps(ay, y, _mm256_fmadd_ps(ax, x, _mm256_add_ps(own, b)));
+                            _mm256_cvtps_epi32(_mm256_fmadd_ps(az, z, sum))
+                        };
+                        let ranks = _mm256_packs_epi32(rank(ax0, ay0, az0, b0), rank(ax1, ay1, az1, b1));
+                        _mm256_storeu_si256(rows.add(i + j).cast::<__m256i>().add(half), ranks);
+                    }
+                    i += 8;
+                }
+            }
         }
     }
 
     #[inline(always)]
-    fn keep_ball(self, all: &Points, point: [f32; 3], limit: f32, kept: &mut Points) {
+    fn count(self, keys: &Keys, at: &Row) -> Row {
         // SAFETY: `self` proves that the instructions are there.
         unsafe {
-            let limit = _mm256_set1_ps(limit);
-            keep(all, kept, point, |x, y, z| {
-                let d2 = _mm256_fmadd_ps(x, x, _mm256_fmadd_ps(y, y, _mm256_mul_ps(z, z)));
-                _mm256_cmp_ps::<_CMP_LE_OQ>(d2, limit)
-            });
+            let at = load_row(at).map(|t| _mm256_add_epi16(t, _mm256_set1_epi16(1)));
+            let mut counts = [_mm256_setzero_si256(); 2];
+            for row in keys.rows() {
+                let rank = load_row(row);
+                for h in 0..2 {
+                    counts[h] = _mm256_sub_epi16(counts[h], _mm256_cmpgt_epi16(at[h], rank[h]));
+                }
+            }
+            row(counts)
         }
     }
 
     #[inline(always)]
-    fn least(self, all: &Points, point: [f32; 3]) -> f32 {
-        let mut lanes = [0f32; 8];
-        assert!(all.fits(all.len), "room for the candidates and the slack");
-        let (xs, ys, zs) = (all.x.as_ptr(), all.y.as_ptr(), all.z.as_ptr());
-        // SAFETY: `self` proves that the instructions are there; `i` is below `all.len`, and the slack wider than a
-        // vector. Blocks are padded with far points.
+    fn count_between(self, keys: &Keys, at: &Row) -> (Row, Row, Row) {
+        // SAFETY: `self` proves that the instructions are there.
         unsafe {
-            let [px, py, pz] = point.map(|p| _mm256_set1_ps(p));
-            let mut least = _mm256_set1_ps(f32::INFINITY);
+            let one = _mm256_set1_epi16(1);
+            let at = load_row(at).map(|t| _mm256_add_epi16(t, one));
+            let (mut counts, mut below) = ([_mm256_setzero_si256(); 2], [_mm256_setzero_si256(); 2]);
+            let mut above = [_mm256_set1_epi16(i16::MAX); 2];
+            for row in keys.rows() {
+                let rank = load_row(row);
+                for h in 0..2 {
+                    let within = _mm256_cmpgt_epi16(at[h], rank[h]);
+                    counts[h] = _mm256_sub_epi16(counts[h], within);
+                    below[h] = _mm256_max_epi16(below[h], _mm256_and_si256(rank[h], within));
+                    above[h] = _mm256_min_epu16(above[h], _mm256_or_si256(rank[h], within));
+                }
+            }
+            (row(counts), row(below), row(above.map(|a| _mm256_sub_epi16(a, one))))
+        }
+    }
+
+    #[inline(always)]
+    fn members(self, keys: &Keys, at: &Row, of: &mut [u32]) -> u32 {
+        // SAFETY: `self` proves that the instructions are there.
+        unsafe {
+            let at = load_row(at);
+            let mut equal = [_mm256_setzero_si256(); 2];
+            for (row, of) in keys.rows().iter().zip(of) {
+                let rank = load_row(row);
+                *of = !bits([_mm256_cmpgt_epi16(rank[0], at[0]), _mm256_cmpgt_epi16(rank[1], at[1])]);
+                for h in 0..2 {
+                    equal[h] = _mm256_or_si256(equal[h], _mm256_cmpeq_epi16(rank[h], at[h]));
+                }
+            }
+            bits(equal)
+        }
+    }
+
+    #[inline(always)]
+    fn choose(self, points: &Points, of: &[u32], bits: u32, near: &mut Near) {
+        let len = points.len;
+        assert!(len <= MOST && points.id.len() >= len + 8 && of.len() >= len + 8, "room for the candidates");
+        assert!(near.id.len() >= MOST + 8 && near.of.len() >= MOST + 8, "room for those chosen");
+        let (ids, of, to_id, to_of) = (points.id.as_ptr(), of.as_ptr(), near.id.as_mut_ptr(), near.of.as_mut_ptr());
+        let mut n = 0;
+        // SAFETY: `self` proves that the instructions are there. `i` and `n` are at most `MOST`, and 8 more are there.
+        unsafe {
+            let bits = _mm256_set1_epi32(bits as i32);
             let mut i = 0;
-            while i < all.len {
-                let x = _mm256_sub_ps(load(xs, i), px);
-                let y = _mm256_sub_ps(load(ys, i), py);
-                let z = _mm256_sub_ps(load(zs, i), pz);
-                least = _mm256_min_ps(_mm256_fmadd_ps(x, x, _mm256_fmadd_ps(y, y, _mm256_mul_ps(z, z))), least);
+            while i < len {
+                let of = _mm256_loadu_si256(of.add(i).cast());
+                let none = _mm256_cmpeq_epi32(_mm256_and_si256(of, bits), _mm256_setzero_si256());
+                let mask = (!_mm256_movemask_ps(_mm256_castsi256_ps(none)) & 255) as usize;
+                let order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(IN_ORDER[mask] as i64));
+                let id = _mm256_permutevar8x32_epi32(_mm256_loadu_si256(ids.add(i).cast()), order);
+                _mm256_storeu_si256(to_id.add(n).cast(), id);
+                _mm256_storeu_si256(to_of.add(n).cast(), _mm256_permutevar8x32_epi32(of, order));
+                n += mask.count_ones() as usize;
                 i += 8;
             }
-            _mm256_storeu_ps(lanes.as_mut_ptr(), least);
         }
-        lanes.into_iter().fold(f32::INFINITY, |a, b| if b < a { b } else { a })
-    }
-
-    #[inline(always)]
-    fn rank(self, points: &Points, offset: f32, scale: f32, keys: &mut Keys) {
-        let n = Keys::padding(points.len);
-        keys.padded = n;
-        assert!(n <= MOST && points.fits(n - SLACK.min(n)), "room for the candidates");
-        assert!(keys.rank.len() >= 6 * MOST, "room for their ranks");
-        let to = keys.rank.as_mut_ptr();
-        // SAFETY: `self` proves that the instructions are there; `i` and the vectors from it on are below `n`.
-        unsafe {
-            let (offset, scale) = (_mm256_set1_ps(offset), _mm256_set1_ps(scale));
-            let mut i = 0;
-            while i < n {
-                let (low, high) = (ranks(points, i, offset, scale), ranks(points, i + 8, offset, scale));
-                for q in 0..6 {
-                    let packed = _mm256_packus_epi32(low[q], high[q]);
-                    // Packing works within halves of a vector; this puts their parts in order.
-                    _mm256_storeu_si256(to.add(q * MOST + i).cast(), _mm256_permute4x64_epi64::<0b11_01_10_00>(packed));
-                }
-                i += 16;
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn count(self, keys: &Keys, thresholds: &Thresholds) -> Thresholds {
-        let mut counts = [0; 8];
-        let padded = keys.checked_padded();
-        // SAFETY: `self` proves that the instructions are there; as many ranks are there as was checked.
-        unsafe {
-            for q in 0..6 {
-                let ranks = keys.rank.as_ptr().add(q * MOST);
-                let threshold = _mm256_set1_epi16(thresholds[q] as i16);
-                let mut count = below::<false>(ranks, 0, threshold).count_ones()
-                    + below::<false>(ranks, 32, threshold).count_ones()
-                    + below::<false>(ranks, 64, threshold).count_ones();
-                let mut i = 96;
-                while i < padded {
-                    count += below::<false>(ranks, i, threshold).count_ones();
-                    i += 32;
-                }
-                counts[q] = count as i32;
-            }
-        }
-        counts
-    }
-
-    #[inline(always)]
-    fn members(self, keys: &Keys, q: usize, threshold: u16, set: &mut Set) {
-        let padded = keys.checked_padded();
-        assert!(q < 6, "one of six stencil points");
-        // SAFETY: `self` proves that the instructions are there; as many ranks are there as was checked.
-        unsafe {
-            let ranks = keys.rank.as_ptr().add(q * MOST);
-            let threshold = _mm256_set1_epi16(threshold as i16);
-            let mut i = 0;
-            while i < padded {
-                let second = if i + 32 < padded { below::<true>(ranks, i + 32, threshold) } else { 0 };
-                set[i / 64] = u64::from(below::<true>(ranks, i, threshold)) | u64::from(second) << 32;
-                i += 64;
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn pack(self, word: u64, places: u64) -> u64 {
-        // SAFETY: `self` proves that the instructions are there.
-        unsafe { _pext_u64(word, places) }
-    }
-
-    #[inline(always)]
-    fn choose(self, from: &[u32], places: u64, to: &mut [u32]) -> usize {
-        choose(from, places, to)
+        near.len = n;
     }
 
     #[inline(always)]
@@ -347,9 +345,12 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn sums(self, near: &Near, weighting: &Weighting) -> [Sum; 6] {
+    fn sums(self, near: &Near, weighting: &Weighting, neighbours: usize) -> [Sum; 6] {
         let mut result = [Sum::default(); 6];
-        assert!(near.len <= MOST && near.value.len() >= 6 * MOST, "whole vectors of neighbours");
+        assert!(
+            near.len <= MOST && near.value.len() >= 6 * MOST && near.of.len() >= MOST,
+            "whole vectors of neighbours"
+        );
         let value = near.value.as_ptr();
         // SAFETY: `self` proves that the instructions are there; `i` is below `near.len`, and `MOST` a multiple of the
         // lanes.
@@ -357,8 +358,7 @@ impl Lanes for Avx2 {
             let offset = _mm256_set1_pd(weighting.offset_m);
             let (least, scale) = (_mm256_set1_pd(weighting.least_m2), _mm256_set1_pd(weighting.scale));
             let round = _mm256_set1_pd(ROUND);
-            let lane = _mm256_setr_epi64x(1, 2, 4, 8);
-            let words = near.len.div_ceil(64);
+            let surplus = surplus(neighbours);
             // One axis at a time, since the registers hold no more.
             for axis in 0..3 {
                 let mut sums = [[_mm256_setzero_si256(); 2]; 2];
@@ -369,9 +369,10 @@ impl Lanes for Avx2 {
                     let c = load_f64(value, (axis + 2) % 3 * MOST + i);
                     let rest = _mm256_add_pd(_mm256_mul_pd(b, b), _mm256_mul_pd(c, c));
                     let normal = load_f64(value, (3 + axis) * MOST + i);
+                    let of = _mm256_cvtepu32_epi64(_mm_loadu_si128(near.of.as_ptr().add(i).cast()));
                     for side in 0..2 {
-                        let bits = (near.of[2 * axis + side][i / 64] >> (i % 64)) as i64;
-                        let belongs = _mm256_cmpeq_epi64(_mm256_and_si256(_mm256_set1_epi64x(bits), lane), lane);
+                        let bit = _mm256_set1_epi64x(1 << (near.shift + 2 * axis + side));
+                        let belongs = _mm256_cmpeq_epi64(_mm256_and_si256(of, bit), bit);
                         let a = if side == 0 { _mm256_sub_pd(u, offset) } else { _mm256_add_pd(u, offset) };
                         let w = weight(a, rest, least, scale);
                         let weighted = _mm256_castpd_si256(_mm256_add_pd(_mm256_mul_pd(w, normal), round));
@@ -386,7 +387,6 @@ impl Lanes for Avx2 {
                 }
                 for side in 0..2 {
                     let q = 2 * axis + side;
-                    let surplus = surplus(&near.of[q][..words]);
                     result[q] = Sum {
                         weighted: total(sums[side][0]).wrapping_sub(surplus),
                         weights: total(sums[side][1]).wrapping_sub(surplus),

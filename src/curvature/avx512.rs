@@ -2,9 +2,8 @@
 #![allow(clippy::needless_range_loop, reason = "stencil points and axes run through several arrays at once")]
 #![allow(unsafe_code)]
 
-use super::buffer::{Points, SLACK};
-use super::lanes::{Keys, Lanes, MOST, Near, Set};
-use super::thresholds::Thresholds;
+use super::buffer::Points;
+use super::lanes::{Keys, Lanes, MOST, Near, Places, Row};
 use super::weights::{FIRST, GUESS, ROUND, SECOND, Sum, Weighting, surplus};
 use super::{kernel, nearest};
 use crate::geometry::DVec3;
@@ -51,15 +50,6 @@ unsafe fn load(from: *const f32, i: usize) -> __m512 {
     unsafe { _mm512_loadu_ps(from.add(i)) }
 }
 
-/// Thirty-two ranks from `i` on.
-///
-/// SAFETY contract: AVX-512 F is there, and so are the ranks.
-#[inline(always)]
-unsafe fn load_ranks(from: *const u16, i: usize) -> __m512i {
-    // SAFETY: by this function's contract.
-    unsafe { _mm512_loadu_si512(from.add(i).cast()) }
-}
-
 /// Eight numbers from `i` on.
 ///
 /// SAFETY contract: AVX-512 F is there, and so are the numbers.
@@ -69,11 +59,29 @@ unsafe fn load_f64(from: *const f64, i: usize) -> __m512d {
     unsafe { _mm512_loadu_pd(from.add(i)) }
 }
 
-/// Keeps the candidates that `near` accepts, less `origin`.
+/// Squared distance as [`Lanes::keep_near_box`] has it, from a box around the origin.
 ///
 /// SAFETY contract: the instructions are there.
 #[inline(always)]
-unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], near: impl Fn(__m512, __m512, __m512) -> __mmask16) {
+unsafe fn square(x: __m512, y: __m512, z: __m512, [hx, hy, hz, offset]: [__m512; 4]) -> __m512 {
+    // SAFETY: the instructions are there by this function's contract.
+    unsafe {
+        let zero = _mm512_setzero_ps();
+        let x = _mm512_max_ps(_mm512_sub_ps(_mm512_abs_ps(x), hx), zero);
+        let y = _mm512_max_ps(_mm512_sub_ps(_mm512_abs_ps(y), hy), zero);
+        let z = _mm512_max_ps(_mm512_sub_ps(_mm512_abs_ps(z), hz), zero);
+        let d2 = _mm512_fmadd_ps(x, x, _mm512_fmadd_ps(y, y, _mm512_mul_ps(z, z)));
+        let most = _mm512_max_ps(_mm512_max_ps(x, y), z);
+        let less = _mm512_max_ps(_mm512_sub_ps(most, offset), _mm512_setzero_ps());
+        _mm512_fmadd_ps(less, less, _mm512_fnmadd_ps(most, most, d2))
+    }
+}
+
+/// [`Lanes::keep_near_box`].
+///
+/// SAFETY contract: the instructions are there.
+#[inline(always)]
+unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], half: [f32; 3], (reach, offset): (f32, f32)) {
     kept.reserve(all.len);
     assert!(all.fits(all.len) && kept.fits(all.len), "room for the candidates and the slack");
     let (xs, ys, zs, ids) = (all.x.as_ptr(), all.y.as_ptr(), all.z.as_ptr(), all.id.as_ptr());
@@ -83,12 +91,15 @@ unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], near: impl Fn(
     // slack that was asserted is wider than a vector.
     unsafe {
         let [ox, oy, oz] = origin.map(|o| _mm512_set1_ps(o));
+        let [hx, hy, hz] = half.map(|h| _mm512_set1_ps(h));
+        let half = [hx, hy, hz, _mm512_set1_ps(offset)];
+        let limit = _mm512_set1_ps(reach * reach);
         let mut i = 0;
         while i < all.len {
             let x = _mm512_sub_ps(load(xs, i), ox);
             let y = _mm512_sub_ps(load(ys, i), oy);
             let z = _mm512_sub_ps(load(zs, i), oz);
-            let mut mask = near(x, y, z);
+            let mut mask = _mm512_cmp_ps_mask::<_CMP_LE_OQ>(square(x, y, z, half), limit);
             if all.len - i < 16 {
                 mask &= (1 << (all.len - i)) - 1;
             }
@@ -106,36 +117,35 @@ unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], near: impl Fn(
     kept.len = n;
 }
 
-/// Ranks of candidates at the six stencil points, in 32 bits.
+/// A row as a vector.
 ///
-/// SAFETY contract: the instructions are there.
+/// SAFETY contract: AVX-512 F is there.
 #[inline(always)]
-unsafe fn ranks(points: &Points, i: usize, offset: __m512, scale: __m512) -> [__m512i; 6] {
-    // SAFETY: the instructions are there by this function's contract.
-    unsafe {
-        let (x, y, z) = (load(points.x.as_ptr(), i), load(points.y.as_ptr(), i), load(points.z.as_ptr(), i));
-        let (x2, y2, z2) = (_mm512_mul_ps(x, x), _mm512_mul_ps(y, y), _mm512_mul_ps(z, z));
-        let (yz, zx, xy) = (_mm512_add_ps(y2, z2), _mm512_add_ps(z2, x2), _mm512_add_ps(x2, y2));
-        [
-            rank(_mm512_sub_ps(x, offset), yz, scale),
-            rank(_mm512_add_ps(x, offset), yz, scale),
-            rank(_mm512_sub_ps(y, offset), zx, scale),
-            rank(_mm512_add_ps(y, offset), zx, scale),
-            rank(_mm512_sub_ps(z, offset), xy, scale),
-            rank(_mm512_add_ps(z, offset), xy, scale),
-        ]
-    }
+unsafe fn load_row(row: &Row) -> __m512i {
+    // SAFETY: by this function's contract; a row is 64 bytes, aligned.
+    unsafe { _mm512_load_si512(row.0.as_ptr().cast()) }
 }
 
-/// The floor of `scale` times (a² + rest), 65535 at most.
+/// A vector as a row.
 ///
-/// SAFETY contract: the instructions are there.
+/// SAFETY contract: AVX-512 F is there.
 #[inline(always)]
-unsafe fn rank(a: __m512, rest: __m512, scale: __m512) -> __m512i {
-    // SAFETY: the instructions are there by this function's contract.
+unsafe fn row(lanes: __m512i) -> Row {
+    let mut row = Row([0; 32]);
+    // SAFETY: by this function's contract; a row is 64 bytes, aligned.
+    unsafe { _mm512_store_si512(row.0.as_mut_ptr().cast(), lanes) };
+    row
+}
+
+/// 32 numbers, every other four of them in a vector: packing two vectors puts them in order again.
+///
+/// SAFETY contract: AVX-512 F is there.
+#[inline(always)]
+unsafe fn quarters(of: &[f32; 32]) -> [__m512; 2] {
+    // SAFETY: by this function's contract.
     unsafe {
-        let d2 = _mm512_mul_ps(_mm512_fmadd_ps(a, a, rest), scale);
-        _mm512_cvttps_epi32(_mm512_min_ps(d2, _mm512_set1_ps(65535.0)))
+        let (a, b) = (load(of.as_ptr(), 0), load(of.as_ptr(), 16));
+        [_mm512_shuffle_f32x4::<0b10_00_10_00>(a, b), _mm512_shuffle_f32x4::<0b11_01_11_01>(a, b)]
     }
 }
 
@@ -161,15 +171,6 @@ unsafe fn weight(a: __m512d, rest: __m512d, least: __m512d, scale: __m512d) -> _
     }
 }
 
-/// Which of 32 ranks from `i` on do not exceed the threshold, whose lanes are all alike.
-///
-/// SAFETY contract: the instructions are there.
-#[inline(always)]
-unsafe fn below(from: *const u16, i: usize, threshold: __m512i) -> u32 {
-    // SAFETY: the instructions are there by this function's contract.
-    unsafe { _mm512_cmple_epu16_mask(load_ranks(from, i), threshold) }
-}
-
 impl Lanes for Avx512 {
     fn column(self, work: &mut kernel::Column<'_, '_>) {
         // SAFETY: `self` proves that the instructions are there.
@@ -182,139 +183,123 @@ impl Lanes for Avx512 {
     }
 
     #[inline(always)]
-    fn keep_near_box(self, all: &Points, centre: [f32; 3], half: [f32; 3], limit: f32, kept: &mut Points) {
+    fn keep_near_box(
+        self,
+        all: &Points,
+        centre: [f32; 3],
+        half: [f32; 3],
+        (reach, offset): (f32, f32),
+        kept: &mut Points,
+    ) {
         // SAFETY: `self` proves that the instructions are there.
-        unsafe {
-            let ([cx, cy, cz], [hx, hy, hz]) = (centre.map(|c| _mm512_set1_ps(c)), half.map(|h| _mm512_set1_ps(h)));
-            let limit = _mm512_set1_ps(limit);
-            let beyond =
-                |x, c, h| _mm512_max_ps(_mm512_sub_ps(_mm512_abs_ps(_mm512_sub_ps(x, c)), h), _mm512_setzero_ps());
-            keep(all, kept, [0.0; 3], |x, y, z| {
-                let (x, y, z) = (beyond(x, cx, hx), beyond(y, cy, hy), beyond(z, cz, hz));
-                let d2 = _mm512_fmadd_ps(x, x, _mm512_fmadd_ps(y, y, _mm512_mul_ps(z, z)));
-                _mm512_cmp_ps_mask::<_CMP_LE_OQ>(d2, limit)
-            });
-        }
+        unsafe { keep(all, kept, centre, half, (reach, offset)) };
     }
 
     #[inline(always)]
-    fn keep_ball(self, all: &Points, point: [f32; 3], limit: f32, kept: &mut Points) {
-        // SAFETY: `self` proves that the instructions are there.
+    fn rank(self, points: &Points, places: &Places, keys: &mut Keys) {
+        assert!(points.fits(points.len), "room for the candidates and the slack");
+        let rows = keys.start(points.len).as_mut_ptr();
+        let (xs, ys, zs) = (points.x.as_ptr(), points.y.as_ptr(), points.z.as_ptr());
+        // SAFETY: `self` proves that the instructions are there. `i + j` is below `points.len`, of which there are rows;
+        // `i` is too, and the slack wider than a vector.
         unsafe {
-            let limit = _mm512_set1_ps(limit);
-            keep(all, kept, point, |x, y, z| {
-                let d2 = _mm512_fmadd_ps(x, x, _mm512_fmadd_ps(y, y, _mm512_mul_ps(z, z)));
-                _mm512_cmp_ps_mask::<_CMP_LE_OQ>(d2, limit)
-            });
-        }
-    }
-
-    #[inline(always)]
-    fn least(self, all: &Points, point: [f32; 3]) -> f32 {
-        assert!(all.fits(all.len), "room for the candidates and the slack");
-        let (xs, ys, zs) = (all.x.as_ptr(), all.y.as_ptr(), all.z.as_ptr());
-        // SAFETY: `self` proves that the instructions are there; `i` is below `all.len`, and the slack wider than a
-        // vector. Blocks are padded with far points.
-        unsafe {
-            let [px, py, pz] = point.map(|p| _mm512_set1_ps(p));
-            let mut least = _mm512_set1_ps(f32::INFINITY);
+            let ([ax0, ax1], [ay0, ay1]) = (quarters(&places.a[0]), quarters(&places.a[1]));
+            let ([az0, az1], [b0, b1]) = (quarters(&places.a[2]), quarters(&places.b));
+            let scale = _mm512_set1_ps(places.scale);
+            let mut own = [0f32; 16];
             let mut i = 0;
-            while i < all.len {
-                let x = _mm512_sub_ps(load(xs, i), px);
-                let y = _mm512_sub_ps(load(ys, i), py);
-                let z = _mm512_sub_ps(load(zs, i), pz);
-                least = _mm512_min_ps(_mm512_fmadd_ps(x, x, _mm512_fmadd_ps(y, y, _mm512_mul_ps(z, z))), least);
+            while i < points.len {
+                let (x, y, z) = (load(xs, i), load(ys, i), load(zs, i));
+                let d2 = _mm512_fmadd_ps(x, x, _mm512_fmadd_ps(y, y, _mm512_mul_ps(z, z)));
+                _mm512_storeu_ps(own.as_mut_ptr(), _mm512_mul_ps(d2, scale));
+                for j in 0..16.min(points.len - i) {
+                    let own = _mm512_set1_ps(own[j]);
+                    let (x, y, z) = (
+                        _mm512_set1_ps(*xs.add(i + j)),
+                        _mm512_set1_ps(*ys.add(i + j)),
+                        _mm512_set1_ps(*zs.add(i + j)),
+                    );
+                    let rank = |ax, ay, az, b| {
+                        let sum = _mm512_fmadd_ps(ay, y, _mm512_fmadd_ps(ax, x, _mm512_add_ps(own, b)));
+                        _mm512_cvtps_epi32(_mm512_fmadd_ps(az, z, sum))
+                    };
+                    let row = _mm512_packs_epi32(rank(ax0, ay0, az0, b0), rank(ax1, ay1, az1, b1));
+                    _mm512_storeu_si512(rows.add(i + j).cast(), row);
+                }
                 i += 16;
             }
-            _mm512_reduce_min_ps(least)
         }
     }
 
     #[inline(always)]
-    fn rank(self, points: &Points, offset: f32, scale: f32, keys: &mut Keys) {
-        let n = Keys::padding(points.len);
-        keys.padded = n;
-        assert!(n <= MOST && points.fits(n - SLACK.min(n)), "room for the candidates");
-        assert!(keys.rank.len() >= 6 * MOST, "room for their ranks");
-        let to = keys.rank.as_mut_ptr();
-        // SAFETY: `self` proves that the instructions are there; `i` and the vectors from it on are below `n`.
+    fn count(self, keys: &Keys, at: &Row) -> Row {
+        // SAFETY: `self` proves that the instructions are there; a row is a whole vector.
         unsafe {
-            let (offset, scale) = (_mm512_set1_ps(offset), _mm512_set1_ps(scale));
-            // Packing works within quarters of a vector; this puts the quarters back in order.
-            let order = _mm512_setr_epi64(0, 2, 4, 6, 1, 3, 5, 7);
-            let mut i = 0;
-            while i < n {
-                let (low, high) = (ranks(points, i, offset, scale), ranks(points, i + 16, offset, scale));
-                for q in 0..6 {
-                    let packed = _mm512_packus_epi32(low[q], high[q]);
-                    _mm512_storeu_si512(to.add(q * MOST + i).cast(), _mm512_permutexvar_epi64(order, packed));
-                }
-                i += 32;
+            let (at, minus) = (load_row(at), _mm512_set1_epi16(-1));
+            let mut counts = _mm512_setzero_si512();
+            for row in keys.rows() {
+                let within = _mm512_cmple_epi16_mask(load_row(row), at);
+                counts = _mm512_mask_sub_epi16(counts, within, counts, minus);
             }
+            row(counts)
         }
     }
 
     #[inline(always)]
-    fn count(self, keys: &Keys, thresholds: &Thresholds) -> Thresholds {
-        let mut counts = [0; 8];
-        let padded = keys.checked_padded();
-        // SAFETY: `self` proves that the instructions are there; as many ranks are there as was checked.
+    fn count_between(self, keys: &Keys, at: &Row) -> (Row, Row, Row) {
+        // SAFETY: `self` proves that the instructions are there; a row is a whole vector.
         unsafe {
-            for q in 0..6 {
-                let ranks = keys.rank.as_ptr().add(q * MOST);
-                let threshold = _mm512_set1_epi16(thresholds[q] as i16);
-                let mut count = below(ranks, 0, threshold).count_ones()
-                    + below(ranks, 32, threshold).count_ones()
-                    + below(ranks, 64, threshold).count_ones();
-                let mut i = 96;
-                while i < padded {
-                    count += below(ranks, i, threshold).count_ones();
-                    i += 32;
-                }
-                counts[q] = count as i32;
+            let (at, minus) = (load_row(at), _mm512_set1_epi16(-1));
+            let (mut counts, mut below) = (_mm512_setzero_si512(), _mm512_setzero_si512());
+            let mut above = _mm512_set1_epi16(i16::MAX);
+            for row in keys.rows() {
+                let rank = load_row(row);
+                let within = _mm512_cmple_epi16_mask(rank, at);
+                counts = _mm512_mask_sub_epi16(counts, within, counts, minus);
+                below = _mm512_mask_max_epi16(below, within, below, rank);
+                above = _mm512_mask_min_epi16(above, !within, above, rank);
             }
+            (row(counts), row(below), row(_mm512_add_epi16(above, minus)))
         }
-        counts
     }
 
     #[inline(always)]
-    fn members(self, keys: &Keys, q: usize, threshold: u16, set: &mut Set) {
-        let padded = keys.checked_padded();
-        assert!(q < 6, "one of six stencil points");
-        // SAFETY: `self` proves that the instructions are there; as many ranks are there as was checked.
+    fn members(self, keys: &Keys, at: &Row, of: &mut [u32]) -> u32 {
+        // SAFETY: `self` proves that the instructions are there; a row is a whole vector.
         unsafe {
-            let ranks = keys.rank.as_ptr().add(q * MOST);
-            let threshold = _mm512_set1_epi16(threshold as i16);
-            let mut i = 0;
-            while i < padded {
-                let second = if i + 32 < padded { below(ranks, i + 32, threshold) } else { 0 };
-                set[i / 64] = u64::from(below(ranks, i, threshold)) | u64::from(second) << 32;
-                i += 64;
+            let at = load_row(at);
+            let mut equal = 0;
+            for (row, of) in keys.rows().iter().zip(of) {
+                let rank = load_row(row);
+                *of = _mm512_cmple_epi16_mask(rank, at);
+                equal |= _mm512_cmpeq_epi16_mask(rank, at);
             }
+            equal
         }
     }
 
     #[inline(always)]
-    fn pack(self, word: u64, places: u64) -> u64 {
-        // SAFETY: `self` proves that the instructions are there.
-        unsafe { _pext_u64(word, places) }
-    }
-
-    #[inline(always)]
-    fn choose(self, from: &[u32], places: u64, to: &mut [u32]) -> usize {
-        assert!(from.len() >= 64 && to.len() >= 64, "room for whole vectors");
+    fn choose(self, points: &Points, of: &[u32], bits: u32, near: &mut Near) {
+        let len = points.len;
+        assert!(len <= MOST && points.id.len() >= len + 16 && of.len() >= len + 16, "room for the candidates");
+        assert!(near.id.len() >= MOST + 16 && near.of.len() >= MOST + 16, "room for those chosen");
+        let (ids, of, to_id, to_of) = (points.id.as_ptr(), of.as_ptr(), near.id.as_mut_ptr(), near.of.as_mut_ptr());
         let mut n = 0;
-        // SAFETY: `self` proves that the instructions are there. Four times 16 are read; and no more written, since
-        // `n` is at most 16 times the vectors done.
+        // SAFETY: `self` proves that the instructions are there. `i` and `n` are at most `MOST`, and 16 more are there.
         unsafe {
-            for part in 0..4 {
-                let mask = (places >> (16 * part)) as u16;
-                let ids = _mm512_loadu_si512(from.as_ptr().add(16 * part).cast());
-                _mm512_storeu_si512(to.as_mut_ptr().add(n).cast(), _mm512_maskz_compress_epi32(mask, ids));
+            let bits = _mm512_set1_epi32(bits as i32);
+            let mut i = 0;
+            while i < len {
+                let of = _mm512_loadu_si512(of.add(i).cast());
+                let mask = _mm512_test_epi32_mask(of, bits);
+                let id = _mm512_maskz_compress_epi32(mask, _mm512_loadu_si512(ids.add(i).cast()));
+                _mm512_storeu_si512(to_id.add(n).cast(), id);
+                _mm512_storeu_si512(to_of.add(n).cast(), _mm512_maskz_compress_epi32(mask, of));
                 n += mask.count_ones() as usize;
+                i += 16;
             }
         }
-        n
+        near.len = n;
     }
 
     #[inline(always)]
@@ -346,8 +331,11 @@ impl Lanes for Avx512 {
     }
 
     #[inline(always)]
-    fn sums(self, near: &Near, weighting: &Weighting) -> [Sum; 6] {
-        assert!(near.len <= MOST && near.value.len() >= 6 * MOST, "whole vectors of neighbours");
+    fn sums(self, near: &Near, weighting: &Weighting, neighbours: usize) -> [Sum; 6] {
+        assert!(
+            near.len <= MOST && near.value.len() >= 6 * MOST && near.of.len() >= MOST,
+            "whole vectors of neighbours"
+        );
         let value = near.value.as_ptr();
         // SAFETY: `self` proves that the instructions are there; `i` is below `near.len`, and `MOST` a multiple of the
         // lanes.
@@ -361,11 +349,12 @@ impl Lanes for Avx512 {
                 let u = [load_f64(value, i), load_f64(value, MOST + i), load_f64(value, 2 * MOST + i)];
                 let (x2, y2, z2) = (_mm512_mul_pd(u[0], u[0]), _mm512_mul_pd(u[1], u[1]), _mm512_mul_pd(u[2], u[2]));
                 let rest = [_mm512_add_pd(y2, z2), _mm512_add_pd(z2, x2), _mm512_add_pd(x2, y2)];
+                let of = _mm512_cvtepu32_epi64(_mm256_loadu_si256(near.of.as_ptr().add(i).cast()));
                 for axis in 0..3 {
                     let normal = load_f64(value, (3 + axis) * MOST + i);
                     for side in 0..2 {
                         let q = 2 * axis + side;
-                        let mask = (near.of[q][i / 64] >> (i % 64)) as u8;
+                        let mask = _mm512_test_epi64_mask(of, _mm512_set1_epi64(1 << (near.shift + q)));
                         let a = if side == 0 { _mm512_sub_pd(u[axis], offset) } else { _mm512_add_pd(u[axis], offset) };
                         let w = weight(a, rest[axis], least, scale);
                         let (weighted, weights) =
@@ -379,10 +368,9 @@ impl Lanes for Avx512 {
                 }
                 i += 8;
             }
-            let words = near.len.div_ceil(64);
+            let surplus = surplus(neighbours);
             let mut result = [Sum::default(); 6];
             for q in 0..6 {
-                let surplus = surplus(&near.of[q][..words]);
                 result[q] = Sum {
                     weighted: _mm512_reduce_add_epi64(sums[q][0]).wrapping_sub(surplus),
                     weights: _mm512_reduce_add_epi64(sums[q][1]).wrapping_sub(surplus),

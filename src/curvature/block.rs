@@ -1,11 +1,11 @@
-//! The candidates around one cell, narrowed for a group of its vertices.
+//! The candidates around one cell, narrowed for vertices that are worked together.
 
 use super::buffer::Points;
 use super::grid::Grid;
 use super::lanes::Lanes;
 use crate::geometry::DVec3;
 
-/// A block of candidates, and the part of it that a group of vertices needs.
+/// A block of candidates.
 pub(super) struct Block {
     /// The cell that the block is around.
     pub(super) slot: [i32; 3],
@@ -13,44 +13,48 @@ pub(super) struct Block {
     pub(super) rings: i32,
     /// Centre of the cell, local metres: candidates are relative to it.
     pub(super) centre: DVec3,
-    group_centre: [f32; 3],
-    group_half: [f32; 3],
-    /// Radius of the balls that the group's list is good for, metres.
-    pub(super) group_radius_m: f64,
 }
 
 impl Block {
-    /// The block around a cell, with no group yet.
+    /// The block around a cell.
     pub(super) fn around(grid: &Grid, slot: [i32; 3], rings: i32) -> Block {
-        Block {
-            slot,
-            rings,
-            centre: grid.centre(slot),
-            group_centre: [0.0; 3],
-            group_half: [0.0; 3],
-            group_radius_m: 0.0,
-        }
+        Block { slot, rings, centre: grid.centre(slot) }
     }
+}
 
-    /// Starts a group of vertices, local metres.
+/// The box around a group of vertices, relative to a block's centre.
+pub(super) struct Group {
+    /// Centre, metres: the group's candidates are relative to it.
+    pub(super) centre: [f32; 3],
+    half: [f32; 3],
+    /// Half the diagonal, metres.
+    pub(super) radius_m: f64,
+}
+
+impl Group {
+    /// The box around places.
     #[inline(always)]
-    pub(super) fn start_group(&mut self, points: impl Iterator<Item = DVec3>) {
+    pub(super) fn around(places: &[DVec3]) -> Group {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for p in points {
-            let at = p - self.centre;
+        for &at in places {
             (low, high) = (low.min(at), high.max(at));
         }
-        self.group_centre = ((low + high) * 0.5).as_vec3().to_array();
-        self.group_half = ((high - low) * 0.500_01).as_vec3().to_array();
-        self.group_radius_m = 0.0;
+        let centre = ((low + high) * 0.5).as_vec3().to_array();
+        let half = (high - low) * 0.500_01;
+        Group { centre, half: half.as_vec3().to_array(), radius_m: half.length() }
     }
 
-    /// Narrows the block to what a ball of this radius around any vertex of the group can hold.
+    /// Narrows the block to what balls around the stencil points of any vertex of the group can hold, whose farthest
+    /// places are `radius_m` from the vertex.
     #[inline(always)]
-    pub(super) fn narrow<L: Lanes>(&mut self, lanes: L, block: &Points, group: &mut Points, radius_m: f64) {
-        self.group_radius_m = radius_m;
-        let limit = (radius_m * 1.000_01) as f32;
-        lanes.keep_near_box(block, self.group_centre, self.group_half, limit * limit, group);
-        group.pad(group.len + 64);
+    pub(super) fn narrow<L: Lanes>(
+        &self,
+        lanes: L,
+        block: &Points,
+        kept: &mut Points,
+        (radius_m, offset_m): (f64, f64),
+    ) {
+        let reach = (radius_m * 1.000_01 - offset_m) as f32;
+        lanes.keep_near_box(block, self.centre, self.half, (reach, offset_m as f32), kept);
     }
 }

@@ -1,24 +1,24 @@
 //! The divergence at all vertices of a column of cells, with the work shared.
 //!
-//! The candidates around a cell are gathered once. Vertices that share an eighth of the cell share a narrower list;
-//! and all six stencil points of a vertex share one ball of about 65 candidates. Its radius is what the vertex before
-//! needed and 4 % more. Ranks at the six points ([`super::thresholds`]) give the sets of neighbours, and only these,
-//! about 45, are fetched in `f64` and weighted ([`super::weights`]).
+//! The candidates around a cell are gathered once. Five vertices next to one another share a narrower list of about 90,
+//! which reaches as far as the vertices before needed and some more. Ranks at all thirty stencil points at once
+//! ([`super::thresholds`]) give the sets of neighbours, and only these, about 45 for a vertex, are fetched in `f64` and
+//! weighted ([`super::weights`]).
 //!
 //! It is exact because of what it checks, not because of what it guesses: a neighbour within the radius less the
-//! offset cannot be outside the ball, ranks carry an error bound, and candidates that ranks cannot tell apart are
-//! compared by (distance², number) in `f64`. Where the ball leaves the gathered block, a wider block is gathered;
+//! offset cannot be outside the list, ranks carry an error bound, and candidates that ranks cannot tell apart are
+//! compared by (distance², number) in `f64`. Where the list leaves the gathered block, a wider block is gathered;
 //! where nothing helps, [`super::neighbours`] searches. The set is the same whichever way it was found, and so are
 //! the sums, bit for bit.
 #![allow(clippy::needless_range_loop, reason = "stencil points and axes run through several arrays at once")]
 
 use super::Stencil;
-use super::block::Block;
-use super::buffer::Points;
+use super::block::{Block, Group};
+use super::buffer::{Points, SLACK};
 use super::grid::Grid;
-use super::lanes::{Keys, Lanes, MOST, Near, Set, WORDS};
+use super::lanes::{Keys, LANES, Lanes, MOST, Near, Places, Row, TOGETHER};
 use super::neighbours::Reserve;
-use super::thresholds::{COMPLETE, Thresholds, search, undecided};
+use super::thresholds::{COMPLETE, HIGHEST, search, undecided};
 use super::weights::{Sum, Weighting, divergence_of};
 use crate::geometry::DVec3;
 use crate::tile::NormalField;
@@ -27,9 +27,9 @@ use crate::tile::NormalField;
 const RINGS: [i32; 3] = [1, 2, 4];
 /// Most candidates of a block.
 const BLOCK: usize = 1 << 15;
-/// A ball is this much wider than the last one had to be.
+/// A list reaches this much further than the last one had to.
 const SPARE: f64 = 1.04;
-/// The ball is trusted up to its radius less this part: rounding in `f32` may lose what is nearer to its rim.
+/// The list is trusted up to its radius less this part: rounding in `f32` may lose what is nearer to its rim.
 const RIM: f64 = 1e-5;
 
 /// Everything that all columns share.
@@ -48,19 +48,20 @@ pub(super) struct Job<'a> {
     pub(super) reserve: &'a Reserve<'a>,
 }
 
-/// Buffers of a thread, and what the vertex before needed.
+/// Buffers of a thread, and what the vertices before needed.
 pub(super) struct Workspace {
     queue: Vec<(u32, u32)>,
     block: Points,
-    group: Points,
-    ball: Points,
+    list: Points,
+    places: Places,
     keys: Keys,
-    sets: [Set; 6],
+    /// For each candidate of the list, the stencil points that it is a neighbour of.
+    of: Vec<u32>,
     near: Near,
-    /// Radius of the ball, metres.
+    /// How far the list reaches, metres.
     radius_m: f64,
     /// Squared distances of the thresholds, m².
-    last_m2: [f64; 8],
+    last_m2: [f64; 6],
 }
 
 impl Workspace {
@@ -70,13 +71,13 @@ impl Workspace {
         Workspace {
             queue: Vec::new(),
             block: Points::default(),
-            group: Points::default(),
-            ball: Points::default(),
+            list: Points::default(),
+            places: Places { a: [[0.0; LANES]; 3], b: [0.0; LANES], scale: 0.0 },
             keys: Keys::new(),
-            sets: [[0; WORDS]; 6],
+            of: vec![0; MOST + SLACK],
             near: Near::new(),
             radius_m: 1.1 * (typical.hypot(stencil.offset_m) + stencil.offset_m),
-            last_m2: [typical * typical; 8],
+            last_m2: [typical * typical; 6],
         }
     }
 }
@@ -94,10 +95,10 @@ pub(super) struct Column<'a, 'j> {
 }
 
 enum Outcome {
-    Known(Option<f64>),
+    Known,
     /// Needs a wider block.
     Further,
-    /// Needs the exact search.
+    /// Cannot be worked together.
     Hopeless,
 }
 
@@ -153,19 +154,23 @@ fn cell<L: Lanes>(lanes: L, column: &mut Column<'_, '_>, queue: &[(u32, u32)]) {
             now.clear();
             break;
         }
-        let mut block = Block::around(job.grid, slot, rings);
-        let mut rest = queue;
+        let block = Block::around(job.grid, slot, rings);
+        let (mut rest, mut alone) = (queue, 0usize);
         while !rest.is_empty() {
-            let group = &rest[..group_len(rest)];
-            block.start_group(group.iter().map(point));
-            for e in group {
-                match vertex(lanes, job, column.work, &mut block, point(e)) {
-                    Outcome::Known(value) => column.found[e.1 as usize] = value,
-                    Outcome::Further => later.push(*e),
-                    Outcome::Hopeless => column.found[e.1 as usize] = job.searched(point(e)),
+            let parts = rest.len().div_ceil(TOGETHER);
+            let size = if alone > 0 { 1 } else { rest.len().div_ceil(parts) };
+            let group = &rest[..size];
+            match together(lanes, column, &block, group) {
+                Outcome::Known => {}
+                Outcome::Further => later.extend_from_slice(group),
+                Outcome::Hopeless if size > 1 => {
+                    alone = size;
+                    continue;
                 }
+                Outcome::Hopeless => column.found[group[0].1 as usize] = job.searched(point(&group[0])),
             }
-            rest = &rest[group.len()..];
+            alone = alone.saturating_sub(1);
+            rest = &rest[size..];
         }
         if later.is_empty() {
             return;
@@ -178,47 +183,43 @@ fn cell<L: Lanes>(lanes: L, column: &mut Column<'_, '_>, queue: &[(u32, u32)]) {
     }
 }
 
-/// How many of the first vertices share an eighth of the cell, or less where they are crowded.
+/// Works a few vertices, [`TOGETHER`] at most, on one list of candidates.
 #[inline(always)]
-fn group_len(queue: &[(u32, u32)]) -> usize {
-    let first = queue[0].0;
-    let mut i = 1;
-    while i < queue.len() && queue[i].0 >> 3 == first >> 3 && (i < 8 || queue[i].0 == queue[i - 1].0) {
-        i += 1;
-    }
-    i
-}
-
-/// Works one vertex.
-#[inline(always)]
-fn vertex<L: Lanes>(lanes: L, job: &Job<'_>, work: &mut Workspace, block: &mut Block, p: DVec3) -> Outcome {
-    let at = p - block.centre;
-    let reach_m = job.grid.reach_m(block.slot, block.rings, at);
-    let k = job.stencil.neighbours as i32;
+fn together<L: Lanes>(lanes: L, column: &mut Column<'_, '_>, block: &Block, queue: &[(u32, u32)]) -> Outcome {
+    let (job, work) = (column.job, &mut *column.work);
+    let point = |e: &(u32, u32)| job.points[column.vertices[e.1 as usize] as usize];
+    let k = job.stencil.neighbours;
     let offset_m = job.weighting.offset_m;
+    let mut at = [DVec3::ZERO; TOGETHER];
+    let (mut reach_m, mut size_m) = (f64::INFINITY, 0.0f64);
+    for (at, e) in at.iter_mut().zip(queue) {
+        *at = point(e) - block.centre;
+        reach_m = reach_m.min(job.grid.reach_m(block.slot, block.rings, *at));
+        size_m = size_m.max(at.abs().max_element());
+    }
+    let at = &at[..queue.len()];
+    let group = Group::around(at);
     let mut radius_m = work.radius_m.min(reach_m);
-    let mut thresholds: Thresholds = [0; 8];
+    let mut thresholds = Row([0; LANES]);
     let per_m2 = loop {
-        if radius_m > block.group_radius_m {
-            block.narrow(lanes, &work.block, &mut work.group, 1.06 * radius_m);
-        }
-        lanes.keep_ball(&work.group, at.as_vec3().to_array(), (radius_m * radius_m) as f32, &mut work.ball);
-        let n = work.ball.len;
-        if n > MOST - 128 || radius_m > 1e3 * job.grid.cell_m {
+        group.narrow(lanes, &work.block, &mut work.list, (radius_m, offset_m));
+        let n = work.list.len;
+        if n > MOST || radius_m > 1e3 * job.grid.cell_m {
             return Outcome::Hopeless;
         }
         let complete_m = radius_m * (1.0 - RIM) - offset_m;
-        if n >= k as usize && complete_m > 0.0 {
-            let per_m2 = COMPLETE / (complete_m * complete_m);
-            if error_in_ranks(job.grid, at, radius_m, complete_m) > 0.45 {
+        if n >= k && complete_m > 0.0 {
+            if error_in_ranks(job, size_m, &group, radius_m, complete_m) > 0.45 {
                 return Outcome::Hopeless;
             }
-            work.ball.pad(Keys::padding(n));
-            lanes.rank(&work.ball, offset_m as f32, per_m2 as f32, &mut work.keys);
-            for (t, m2) in thresholds.iter_mut().zip(&work.last_m2) {
-                *t = (m2 * per_m2) as i32;
+            let per_m2 = COMPLETE / (complete_m * complete_m);
+            place(&mut work.places, at, &group, offset_m, per_m2);
+            lanes.rank(&work.list, &work.places, &mut work.keys);
+            let guess = work.last_m2.map(|m2| (m2 * per_m2).min(f64::from(HIGHEST)) as i16);
+            for (l, t) in thresholds.0.iter_mut().enumerate() {
+                *t = guess[l % 6];
             }
-            if search(lanes, &work.keys, k, &mut thresholds) {
+            if search(lanes, &work.keys, k as i32, &mut thresholds) {
                 break per_m2;
             }
         }
@@ -227,60 +228,82 @@ fn vertex<L: Lanes>(lanes: L, job: &Job<'_>, work: &mut Workspace, block: &mut B
         }
         radius_m = (1.15 * radius_m).min(reach_m);
     };
+    let n = work.list.len;
+    let equal = lanes.members(&work.keys, &thresholds, &mut work.of[..n]);
+    work.of[n..n + SLACK].fill(0);
     let m2_per = 1.0 / per_m2;
+    work.last_m2 = [0.0; 6];
+    let share = m2_per / queue.len() as f64;
     let mut farthest = 0;
-    for (t, m2) in thresholds.iter().zip(&mut work.last_m2) {
-        *m2 = (f64::from(*t) + 0.5) * m2_per;
-        farthest = farthest.max(*t);
+    for (v, e) in queue.iter().enumerate() {
+        let p = point(e);
+        let own = &thresholds.0[6 * v..6 * v + 6];
+        let mut highest = 0;
+        for (t, m2) in own.iter().zip(&mut work.last_m2) {
+            *m2 += (f64::from(*t) + 0.5) * share;
+            highest = highest.max(*t);
+        }
+        farthest = farthest.max(highest);
+        if equal >> (6 * v) & 63 != 0 {
+            for q in (0..6).filter(|q| equal >> (6 * v + q) & 1 == 1) {
+                decide(job, work, p, (v, q), own[q]);
+            }
+        }
+        let farthest_m = ((f64::from(highest) + 1.5) * m2_per).sqrt();
+        let inside = farthest_m + offset_m < job.field.loaded.margin_m(p) - RIM * radius_m;
+        // Not in a closure, which would be compiled without the instruction set.
+        column.found[e.1 as usize] = if inside || certain(job, work, p, v) {
+            work.near.shift = 6 * v;
+            lanes.choose(&work.list, &work.of[..n + SLACK], 63 << (6 * v), &mut work.near);
+            let end = work.near.len;
+            work.near.of[end..end + 8].fill(0);
+            lanes.fetch(job.field, p, &mut work.near);
+            Some(divergence_of(&lanes.sums(&work.near, &job.weighting, k), offset_m))
+        } else {
+            None
+        };
     }
-    let farthest_m = ((f64::from(farthest) + 1.5) * m2_per).sqrt();
-    work.radius_m = SPARE * (farthest_m + offset_m);
-    choose(lanes, job, work, p, &thresholds);
-    let inside = farthest_m + offset_m < job.field.loaded.margin_m(p) - RIM * radius_m;
-    if !inside && !certain(job, work, p) {
-        return Outcome::Known(None);
+    work.radius_m = SPARE * (((f64::from(farthest) + 1.5) * m2_per).sqrt() + offset_m);
+    Outcome::Known
+}
+
+/// Places the stencil points of vertices, relative to their group's centre; idle lanes do what others do.
+#[inline(always)]
+fn place(places: &mut Places, at: &[DVec3], group: &Group, offset_m: f64, per_m2: f64) {
+    let centre = DVec3::from_array(group.centre.map(f64::from));
+    let (shift, scale) = ((-2.0 * per_m2 * offset_m) as f32, -2.0 * per_m2);
+    for v in 0..TOGETHER {
+        let u = at[if v < at.len() { v } else { 0 }] - centre;
+        let (a, b) = ((u * scale).as_vec3(), per_m2 * (u.length_squared() + offset_m * offset_m));
+        let b_shift = u * (2.0 * per_m2 * offset_m);
+        for axis in 0..3 {
+            places.a[axis][6 * v..6 * v + 6].fill(a[axis]);
+            places.a[axis][6 * v + 2 * axis] = a[axis] + shift;
+            places.a[axis][6 * v + 2 * axis + 1] = a[axis] - shift;
+            places.b[6 * v + 2 * axis] = (b + b_shift[axis]) as f32;
+            places.b[6 * v + 2 * axis + 1] = (b - b_shift[axis]) as f32;
+        }
     }
-    fetch(lanes, job, work, p);
-    let sums = lanes.sums(&work.near, &job.weighting);
-    Outcome::Known(Some(divergence_of(&sums, offset_m)))
+    for l in 6 * TOGETHER..LANES {
+        for axis in 0..3 {
+            places.a[axis][l] = places.a[axis][l % 6];
+        }
+        places.b[l] = places.b[l % 6];
+    }
+    places.scale = per_m2 as f32;
 }
 
 /// A bound on the error of ranks: coordinates are `f32` relative to cells, so that each difference of two is off by
 /// up to `each`, a distance by sqrt(3) times that, and its square (up to `complete_m`²) by twice that times the
-/// distance; the square itself is rounded six times.
+/// distance. The square is made of terms that add up to `sum`² at most, and rounded fourteen times.
 #[inline(always)]
-fn error_in_ranks(grid: &Grid, at: DVec3, radius_m: f64, complete_m: f64) -> f64 {
+fn error_in_ranks(job: &Job<'_>, size_m: f64, group: &Group, radius_m: f64, complete_m: f64) -> f64 {
     let ulp = f64::from(f32::EPSILON) / 2.0;
-    let size = at.abs().max_element() + radius_m + grid.cell_m;
-    let each = ulp * 3.0 * (size + radius_m) + 8.0 * f64::EPSILON * (grid.magnitude_m() + size);
+    let size = size_m + radius_m + job.grid.cell_m;
+    let each = ulp * 3.0 * (size + radius_m) + 8.0 * f64::EPSILON * (job.grid.magnitude_m() + size);
     let relative = each / complete_m;
-    COMPLETE * (relative * (3.5 + 3.0 * relative) + 6.0 * ulp)
-}
-
-/// Finds the sets of neighbours from the thresholds.
-#[inline(always)]
-fn choose<L: Lanes>(lanes: L, job: &Job<'_>, work: &mut Workspace, p: DVec3, thresholds: &Thresholds) {
-    let k = job.stencil.neighbours as i32;
-    let mut lower = *thresholds;
-    for t in &mut lower {
-        *t = (*t - 1).max(0);
-    }
-    let below = lanes.count(&work.keys, &lower);
-    let clear = |q: usize| below[q] == k && thresholds[q] > 0;
-    for q in 0..6 {
-        lanes.members(&work.keys, q, thresholds[q] as u16, &mut work.sets[q]);
-    }
-    let mut all = true;
-    for q in 0..6 {
-        all &= clear(q);
-    }
-    if !all {
-        for q in 0..6 {
-            if !clear(q) {
-                decide(job, work, p, q, thresholds[q]);
-            }
-        }
-    }
+    let sum = (2.0 * group.radius_m + radius_m + job.weighting.offset_m) / complete_m;
+    COMPLETE * (relative * (3.5 + 3.0 * relative) + 14.0 * ulp * sum * sum)
 }
 
 /// Where a stencil point is: +x, -x, +y, -y, +z, -z.
@@ -290,66 +313,39 @@ pub(super) fn stencil_point(p: DVec3, q: usize, offset_m: f64) -> DVec3 {
     if q.is_multiple_of(2) { p + shift } else { p - shift }
 }
 
-/// Decides between candidates of about the same distance by (distance², number) in `f64`.
+/// Decides between candidates of about the same distance from a vertex's stencil point by (distance², number) in `f64`.
 #[cold]
 #[inline(never)]
-fn decide(job: &Job<'_>, work: &mut Workspace, p: DVec3, q: usize, threshold: i32) {
+fn decide(job: &Job<'_>, work: &mut Workspace, p: DVec3, (v, q): (usize, usize), threshold: i16) {
     let place = stencil_point(p, q, job.weighting.offset_m);
-    let set = &mut work.sets[q];
-    let mut between: Vec<(f64, u32, usize)> = undecided(&work.keys, q, threshold, set)
+    let lane = 6 * v + q;
+    let of = &mut work.of[..work.list.len];
+    let mut between: Vec<(f64, u32, usize)> = undecided(&work.keys, lane, threshold, of)
         .into_iter()
-        .filter(|&i| i < work.ball.len)
         .map(|i| {
-            let t = work.ball.id[i];
+            let t = work.list.id[i];
             (super::neighbours::distance2(job.field.centroids[t as usize], place), t, i)
         })
         .collect();
     between.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let sure: u32 = set.iter().map(|w| w.count_ones()).sum();
-    for &(_, _, i) in between.iter().take(job.stencil.neighbours.saturating_sub(sure as usize)) {
-        set[i / 64] |= 1 << (i % 64);
+    let sure = of.iter().filter(|&&of| of >> lane & 1 == 1).count();
+    for &(_, _, i) in between.iter().take(job.stencil.neighbours.saturating_sub(sure)) {
+        of[i] |= 1 << lane;
     }
 }
 
 /// Whether nothing beyond what was loaded could be as near as the farthest neighbour of each stencil point.
 #[cold]
 #[inline(never)]
-fn certain(job: &Job<'_>, work: &Workspace, p: DVec3) -> bool {
+fn certain(job: &Job<'_>, work: &Workspace, p: DVec3, v: usize) -> bool {
     (0..6).all(|q| {
         let place = stencil_point(p, q, job.weighting.offset_m);
-        let in_set = |i: &usize| work.sets[q][i / 64] >> (i % 64) & 1 == 1;
-        let farthest = (0..work.ball.len)
-            .filter(in_set)
-            .map(|i| super::neighbours::distance2(job.field.centroids[work.ball.id[i] as usize], place))
+        let farthest = (0..work.list.len)
+            .filter(|&i| work.of[i] >> (6 * v + q) & 1 == 1)
+            .map(|i| super::neighbours::distance2(job.field.centroids[work.list.id[i] as usize], place))
             .fold(0.0, f64::max);
         farthest.sqrt() < job.field.loaded.margin_m(place)
     })
-}
-
-/// Fetches the neighbours of any stencil point in `f64`, and packs the sets accordingly.
-#[inline(always)]
-fn fetch<L: Lanes>(lanes: L, job: &Job<'_>, work: &mut Workspace, p: DVec3) {
-    let words = work.keys.padded.div_ceil(64);
-    let near = &mut work.near;
-    for q in 0..6 {
-        near.of[q][..words].fill(0);
-    }
-    let mut n = 0usize;
-    for w in 0..words {
-        let s = &work.sets;
-        let any = s[0][w] | s[1][w] | s[2][w] | s[3][w] | s[4][w] | s[5][w];
-        let (word, bit) = (n / 64, n % 64);
-        for q in 0..6 {
-            let packed = lanes.pack(work.sets[q][w], any);
-            near.of[q][word] |= packed << bit;
-            if bit > 0 && word + 1 < WORDS {
-                near.of[q][word + 1] |= packed >> (64 - bit);
-            }
-        }
-        n += lanes.choose(&work.ball.id[w * 64..w * 64 + 64], any, &mut near.id[n..]);
-    }
-    near.len = n;
-    lanes.fetch(job.field, p, near);
 }
 
 /// The sum of one stencil point's neighbours.

@@ -4,65 +4,74 @@
 //! like. Sums must be the same bits in all.
 #![allow(clippy::needless_range_loop, reason = "stencil points and axes run through several arrays at once")]
 
-use super::buffer::{Aligned, Points};
-use super::thresholds::Thresholds;
+use super::buffer::{Aligned, Points, SLACK};
 use super::weights::{Sum, Weighting};
 use crate::geometry::DVec3;
 use crate::tile::NormalField;
 
-/// Most candidates that a vertex may have.
+/// Most candidates that vertices worked together may have.
 pub(super) const MOST: usize = 1024;
-/// Words of a set of candidates.
-pub(super) const WORDS: usize = MOST / 64;
-/// A set of candidates: bit i for candidate i.
-pub(super) type Set = [u64; WORDS];
+/// Stencil points that are searched together.
+pub(super) const LANES: usize = 32;
+/// Vertices that are worked together: six stencil points each.
+pub(super) const TOGETHER: usize = LANES / 6;
 
-/// Ranks of the candidates at the six stencil points: squared distances, scaled and cut to 16 bits.
+/// One small number for each stencil point: that of vertex v at +x, -x, +y, -y, +z, -z has lane 6 v and following.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(C, align(64))]
+pub(super) struct Row(pub(super) [i16; LANES]);
+
+/// Where the stencil points are, such that the rank of a candidate c is scale c² + a·c + b.
+#[derive(Debug)]
+#[repr(C, align(64))]
+pub(super) struct Places {
+    /// -2 scale times the place, 1/m.
+    pub(super) a: [[f32; LANES]; 3],
+    /// scale times its square.
+    pub(super) b: [f32; LANES],
+    /// Ranks for a square metre.
+    pub(super) scale: f32,
+}
+
+/// Ranks of the candidates at the stencil points: squared distances, scaled and rounded to 15 bits.
 #[derive(Debug)]
 pub(super) struct Keys {
-    /// `MOST` for each of +x, -x, +y, -y, +z, -z; from `padded` on, undefined.
-    pub(super) rank: Aligned<u16>,
-    /// Candidates with padding, a multiple of 32 and at least 96; padding has the highest rank.
-    pub(super) padded: usize,
+    row: Vec<Row>,
+    /// How many candidates are ranked.
+    len: usize,
 }
 
 impl Keys {
     /// Room for `MOST` candidates.
     pub(super) fn new() -> Keys {
-        Keys { rank: Aligned::of(6 * MOST), padded: 0 }
+        Keys { row: vec![Row([0; LANES]); MOST], len: 0 }
     }
 
-    /// How many candidates are ranked, with padding.
-    pub(super) fn padding(len: usize) -> usize {
-        len.next_multiple_of(32).max(96)
-    }
-
-    /// How many are ranked, all of which are there.
+    /// The rows of this many candidates, to be filled.
     #[inline(always)]
-    pub(super) fn checked_padded(&self) -> usize {
-        assert!(
-            (96..=MOST).contains(&self.padded) && self.padded.is_multiple_of(32) && self.rank.len() >= 6 * MOST,
-            "whole vectors"
-        );
-        self.padded
+    pub(super) fn start(&mut self, len: usize) -> &mut [Row] {
+        self.len = len;
+        &mut self.row[..len]
     }
 
-    /// Ranks at a stencil point.
+    /// Ranks of each candidate.
     #[inline(always)]
-    pub(super) fn at(&self, q: usize) -> &[u16] {
-        &self.rank[q * MOST..q * MOST + self.padded]
+    pub(super) fn rows(&self) -> &[Row] {
+        &self.row[..self.len]
     }
 }
 
-/// Neighbours of at least one stencil point, exactly: offsets from the vertex and normals.
+/// Neighbours of at least one stencil point of a vertex, exactly: offsets from the vertex and normals.
 #[derive(Debug)]
 pub(super) struct Near {
     /// Local triangle numbers.
     pub(super) id: Aligned<u32>,
     /// x, y, z of the offset (metres) and of the normal, `MOST` each.
     pub(super) value: Aligned<f64>,
-    /// Which of them belong to each stencil point.
-    pub(super) of: [Set; 6],
+    /// Which stencil points they belong to: bit `shift` + q for point q.
+    pub(super) of: Aligned<u32>,
+    /// First bit of the vertex.
+    pub(super) shift: usize,
     /// How many.
     pub(super) len: usize,
 }
@@ -70,9 +79,28 @@ pub(super) struct Near {
 impl Near {
     /// Room for `MOST` neighbours.
     pub(super) fn new() -> Near {
-        Near { id: Aligned::of(MOST + 64), value: Aligned::of(6 * MOST), of: [[0; WORDS]; 6], len: 0 }
+        let room = MOST + SLACK;
+        Near { id: Aligned::of(room), value: Aligned::of(6 * MOST), of: Aligned::of(room), shift: 0, len: 0 }
     }
 }
+
+/// For each set of eight lanes, their numbers in order, a byte each.
+pub(super) static IN_ORDER: [u64; 256] = {
+    let mut table = [0; 256];
+    let mut set = 0;
+    while set < 256 {
+        let (mut lane, mut to) = (0, 0);
+        while lane < 8 {
+            if set >> lane & 1 == 1 {
+                table[set] |= (lane as u64) << (8 * to);
+                to += 1;
+            }
+            lane += 1;
+        }
+        set += 1;
+    }
+    table
+};
 
 /// A vector instruction set, known to be there.
 pub(super) trait Lanes: Copy + Send + Sync {
@@ -82,35 +110,40 @@ pub(super) trait Lanes: Copy + Send + Sync {
     /// Works one column of the search for nearest centroids.
     fn nearest_column(self, column: &mut super::nearest::Column<'_, '_>);
 
-    /// Keeps the candidates no further than sqrt(`limit`) from a box, given by its centre and half sides.
-    fn keep_near_box(self, all: &Points, centre: [f32; 3], half: [f32; 3], limit: f32, kept: &mut Points);
+    /// Keeps the candidates no further than `reach` from some place in a box (given by its centre and half sides) that is
+    /// moved by `offset` along an axis, and perhaps others; their coordinates become relative to the centre. With b
+    /// how far the candidate is from the box along each axis, and the shift along that of the largest b (which gains
+    /// most), the distance is at least that of b with its largest component less by `offset`.
+    fn keep_near_box(
+        self,
+        all: &Points,
+        centre: [f32; 3],
+        half: [f32; 3],
+        reach_and_offset: (f32, f32),
+        kept: &mut Points,
+    );
 
-    /// Keeps the candidates no further than sqrt(`limit`) from a point; their coordinates become relative to it.
-    fn keep_ball(self, all: &Points, point: [f32; 3], limit: f32, kept: &mut Points);
+    /// Ranks candidates (`MOST` at most) at the stencil points; none may rank 2^31.
+    fn rank(self, points: &Points, places: &Places, keys: &mut Keys);
 
-    /// Least squared distance from the point.
-    fn least(self, all: &Points, point: [f32; 3]) -> f32;
+    /// How many candidates rank no higher than the thresholds.
+    fn count(self, keys: &Keys, at: &Row) -> Row;
 
-    /// Ranks padded candidates at the six points `offset` away: floor of `scale` times squared distance, 65535 at most.
-    fn rank(self, points: &Points, offset: f32, scale: f32, keys: &mut Keys);
+    /// As [`Lanes::count`]; also the highest rank that does not exceed the threshold, and the lowest that does, less 1.
+    fn count_between(self, keys: &Keys, at: &Row) -> (Row, Row, Row);
 
-    /// How many candidates rank no higher than the thresholds (0 to 65535); the two idle lanes count nothing.
-    fn count(self, keys: &Keys, thresholds: &Thresholds) -> Thresholds;
+    /// For each candidate, the stencil points where it ranks no higher than the threshold; and those where some
+    /// candidate ranks the same.
+    fn members(self, keys: &Keys, at: &Row, of: &mut [u32]) -> u32;
 
-    /// Which candidates at stencil point `q` rank no higher than the threshold.
-    fn members(self, keys: &Keys, q: usize, threshold: u16, set: &mut Set);
-
-    /// The bits of `word` at the places that `places` has, moved together.
-    fn pack(self, word: u64, places: u64) -> u64;
-
-    /// Puts the numbers (64 of them) at these places together; returns how many.
-    fn choose(self, from: &[u32], places: u64, to: &mut [u32]) -> usize;
+    /// Chooses the candidates that belong to a stencil point in `bits`. From the last one on, `of` has `SLACK` zeros.
+    fn choose(self, points: &Points, of: &[u32], bits: u32, near: &mut Near);
 
     /// Fetches offsets from a vertex and normals of the numbered triangles.
     fn fetch(self, field: &NormalField, vertex: DVec3, near: &mut Near);
 
-    /// Sums at the six stencil points.
-    fn sums(self, near: &Near, weighting: &Weighting) -> [Sum; 6];
+    /// Sums at the six stencil points, with as many neighbours each.
+    fn sums(self, near: &Near, weighting: &Weighting, neighbours: usize) -> [Sum; 6];
 }
 
 /// Plain Rust, for any processor.
@@ -137,18 +170,6 @@ fn keep(all: &Points, kept: &mut Points, limit: f32, relative: [f32; 3], distanc
     kept.len = n;
 }
 
-/// [`Lanes::choose`], one by one.
-#[inline(always)]
-pub(super) fn choose(from: &[u32], mut places: u64, to: &mut [u32]) -> usize {
-    let mut n = 0;
-    while places != 0 {
-        to[n] = from[places.trailing_zeros() as usize];
-        n += 1;
-        places &= places - 1;
-    }
-    n
-}
-
 /// [`Lanes::fetch`], one by one.
 #[inline(always)]
 pub(super) fn fetch(field: &NormalField, vertex: DVec3, near: &mut Near) {
@@ -165,6 +186,25 @@ pub(super) fn fetch(field: &NormalField, vertex: DVec3, near: &mut Near) {
     }
 }
 
+impl Plain {
+    /// Keeps the candidates no further than sqrt(`limit`) from a point; their coordinates become relative to it.
+    #[inline(always)]
+    pub(super) fn keep_ball(self, all: &Points, p: [f32; 3], limit: f32, kept: &mut Points) {
+        keep(all, kept, limit, p, |x, y, z| square(x - p[0]) + square(y - p[1]) + square(z - p[2]));
+    }
+
+    /// Least squared distance from the point.
+    #[inline(always)]
+    pub(super) fn least(self, all: &Points, p: [f32; 3]) -> f32 {
+        let mut least = f32::INFINITY;
+        for ((x, y), z) in all.x[..all.len].iter().zip(&all.y[..all.len]).zip(&all.z[..all.len]) {
+            let d2 = square(x - p[0]) + square(y - p[1]) + square(z - p[2]);
+            least = if d2 < least { d2 } else { least };
+        }
+        least
+    }
+}
+
 impl Lanes for Plain {
     fn column(self, column: &mut super::kernel::Column<'_, '_>) {
         super::kernel::work(self, column);
@@ -175,79 +215,84 @@ impl Lanes for Plain {
     }
 
     #[inline(always)]
-    fn keep_near_box(self, all: &Points, centre: [f32; 3], half: [f32; 3], limit: f32, kept: &mut Points) {
-        let beyond = |x: f32, axis: usize| square(((x - centre[axis]).abs() - half[axis]).max(0.0));
-        keep(all, kept, limit, [0.0; 3], |x, y, z| beyond(x, 0) + beyond(y, 1) + beyond(z, 2));
+    fn keep_near_box(
+        self,
+        all: &Points,
+        centre: [f32; 3],
+        half: [f32; 3],
+        (reach, offset): (f32, f32),
+        kept: &mut Points,
+    ) {
+        let beyond = |x: f32, axis: usize| ((x - centre[axis]).abs() - half[axis]).max(0.0);
+        keep(all, kept, reach * reach, centre, |x, y, z| {
+            let (x, y, z) = (beyond(x, 0), beyond(y, 1), beyond(z, 2));
+            let most = x.max(y).max(z);
+            square(x) + square(y) + square(z) - square(most) + square((most - offset).max(0.0))
+        });
     }
 
     #[inline(always)]
-    fn keep_ball(self, all: &Points, p: [f32; 3], limit: f32, kept: &mut Points) {
-        keep(all, kept, limit, p, |x, y, z| square(x - p[0]) + square(y - p[1]) + square(z - p[2]));
-    }
-
-    #[inline(always)]
-    fn least(self, all: &Points, p: [f32; 3]) -> f32 {
-        let mut least = f32::INFINITY;
-        for ((x, y), z) in all.x[..all.len].iter().zip(&all.y[..all.len]).zip(&all.z[..all.len]) {
-            let d2 = square(x - p[0]) + square(y - p[1]) + square(z - p[2]);
-            least = if d2 < least { d2 } else { least };
-        }
-        least
-    }
-
-    #[inline(always)]
-    fn rank(self, points: &Points, offset: f32, scale: f32, keys: &mut Keys) {
-        let n = Keys::padding(points.len);
-        keys.padded = n;
-        for q in 0..6 {
-            let ranks = &mut keys.rank[q * MOST..q * MOST + n];
-            let shift = if q.is_multiple_of(2) { offset } else { -offset };
-            let [a, b, c] = match q / 2 {
-                0 => [&points.x, &points.y, &points.z],
-                1 => [&points.y, &points.z, &points.x],
-                _ => [&points.z, &points.x, &points.y],
-            };
-            for (((rank, a), b), c) in ranks.iter_mut().zip(&a[..n]).zip(&b[..n]).zip(&c[..n]) {
-                let d2 = (square(a - shift) + square(*b) + square(*c)) * scale;
-                *rank = (if d2 < 65535.0 { d2 } else { 65535.0 }) as i32 as u16;
+    fn rank(self, points: &Points, places: &Places, keys: &mut Keys) {
+        let [ax, ay, az] = &places.a;
+        for (i, row) in keys.start(points.len).iter_mut().enumerate() {
+            let (x, y, z) = (points.x[i], points.y[i], points.z[i]);
+            let own = (square(x) + square(y) + square(z)) * places.scale;
+            for l in 0..LANES {
+                let rank = own + places.b[l] + ax[l] * x + ay[l] * y + az[l] * z;
+                let rank = if rank < 32767.0 { rank } else { 32767.0 };
+                row.0[l] = (rank + 0.5) as i32 as i16;
             }
         }
     }
 
     #[inline(always)]
-    fn count(self, keys: &Keys, thresholds: &Thresholds) -> Thresholds {
-        let mut counts = [0; 8];
-        for q in 0..6 {
-            let (mut count, threshold) = (0u16, thresholds[q] as u16);
-            for &rank in keys.at(q) {
-                count += u16::from(rank <= threshold);
+    fn count(self, keys: &Keys, at: &Row) -> Row {
+        let mut counts = Row([0; LANES]);
+        for row in keys.rows() {
+            for l in 0..LANES {
+                counts.0[l] += i16::from(row.0[l] <= at.0[l]);
             }
-            counts[q] = i32::from(count);
         }
         counts
     }
 
     #[inline(always)]
-    fn members(self, keys: &Keys, q: usize, threshold: u16, set: &mut Set) {
-        for (word, ranks) in set.iter_mut().zip(keys.at(q).chunks(64)) {
-            *word = ranks.iter().enumerate().fold(0, |w, (i, &rank)| w | u64::from(rank <= threshold) << i);
+    fn count_between(self, keys: &Keys, at: &Row) -> (Row, Row, Row) {
+        let (mut below, mut above) = (Row([0; LANES]), Row([i16::MAX; LANES]));
+        for row in keys.rows() {
+            for l in 0..LANES {
+                let rank = row.0[l];
+                let within = rank <= at.0[l];
+                below.0[l] = below.0[l].max(if within { rank } else { 0 });
+                above.0[l] = above.0[l].min(if within { i16::MAX } else { rank });
+            }
         }
+        above.0.iter_mut().for_each(|rank| *rank -= 1);
+        (self.count(keys, at), below, above)
     }
 
     #[inline(always)]
-    fn pack(self, word: u64, mut places: u64) -> u64 {
-        let (mut packed, mut to) = (0, 0);
-        while places != 0 {
-            packed |= (word >> places.trailing_zeros() & 1) << to;
-            to += 1;
-            places &= places - 1;
+    fn members(self, keys: &Keys, at: &Row, of: &mut [u32]) -> u32 {
+        let mut equal = 0;
+        for (row, of) in keys.rows().iter().zip(of) {
+            *of = 0;
+            for l in 0..LANES {
+                *of |= u32::from(row.0[l] <= at.0[l]) << l;
+                equal |= u32::from(row.0[l] == at.0[l]) << l;
+            }
         }
-        packed
+        equal
     }
 
     #[inline(always)]
-    fn choose(self, from: &[u32], places: u64, to: &mut [u32]) -> usize {
-        choose(from, places, to)
+    fn choose(self, points: &Points, of: &[u32], bits: u32, near: &mut Near) {
+        let mut n = 0;
+        for (&id, &of) in points.id[..points.len].iter().zip(of) {
+            near.id[n] = id;
+            near.of[n] = of;
+            n += usize::from(of & bits != 0);
+        }
+        near.len = n;
     }
 
     #[inline(always)]
@@ -256,7 +301,7 @@ impl Lanes for Plain {
     }
 
     #[inline(always)]
-    fn sums(self, near: &Near, weighting: &Weighting) -> [Sum; 6] {
+    fn sums(self, near: &Near, weighting: &Weighting, _: usize) -> [Sum; 6] {
         let mut sums = [Sum::default(); 6];
         let value = |k: usize| &near.value[k * MOST..k * MOST + near.len];
         for q in 0..6usize {
@@ -267,7 +312,7 @@ impl Lanes for Plain {
             for i in 0..near.len {
                 let shifted = a[i] - side;
                 let weight = weighting.weight(shifted * shifted + (b[i] * b[i] + c[i] * c[i]));
-                let belongs = ((near.of[q][i / 64] >> (i % 64) & 1) as i64).wrapping_neg();
+                let belongs = i64::from(near.of[i] >> (near.shift + q) & 1).wrapping_neg();
                 weights = weights.wrapping_add(super::weights::rounded(weight) & belongs);
                 weighted = weighted.wrapping_add(super::weights::rounded(weight * n[i]) & belongs);
             }

@@ -21,8 +21,8 @@ pub struct Neighbours<'a> {
     column_m: f64,
     columns: [usize; 2],
     start: Vec<u32>,
-    /// Heights and local triangle numbers, column by column, ascending within each.
-    sorted: Vec<(f64, u32)>,
+    /// Local triangle numbers, column by column, from the lowest up in each.
+    sorted: Vec<u32>,
     height: [f64; 2],
 }
 
@@ -108,13 +108,15 @@ impl<'a> Neighbours<'a> {
             self.start[i] += self.start[i - 1];
         }
         let mut next = self.start.clone();
-        self.sorted = vec![(0.0, 0); place.len()];
+        self.sorted = vec![0; place.len()];
         for (t, &p) in place.iter().enumerate() {
-            self.sorted[next[p as usize] as usize] = (self.field.centroids[t].z, t as u32);
+            self.sorted[next[p as usize] as usize] = t as u32;
             next[p as usize] += 1;
         }
+        let height = |t: u32| self.field.centroids[t as usize].z;
         for w in self.start.windows(2) {
-            self.sorted[w[0] as usize..w[1] as usize].sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            self.sorted[w[0] as usize..w[1] as usize]
+                .sort_unstable_by(|&a, &b| height(a).total_cmp(&height(b)).then(a.cmp(&b)));
         }
     }
 
@@ -160,13 +162,14 @@ impl<'a> Neighbours<'a> {
                 let c = row * self.columns[0] + column;
                 let mut run = &self.sorted[self.start[c] as usize..self.start[c + 1] as usize];
                 if !whole_height && run.len() > 8 {
-                    run = &run[run.partition_point(|e| e.0 < low)..];
+                    run = &run[run.partition_point(|&t| self.field.centroids[t as usize].z < low)..];
                 }
-                for &(z, t) in run {
-                    if z > high {
+                for &t in run {
+                    let centroid = self.field.centroids[t as usize];
+                    if centroid.z > high {
                         break;
                     }
-                    let d2 = distance2(self.field.centroids[t as usize], p);
+                    let d2 = distance2(centroid, p);
                     if d2 <= limit {
                         found.push((d2, t));
                     }

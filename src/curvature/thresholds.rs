@@ -1,65 +1,71 @@
-//! The `k` nearest candidates of six stencil points at once, without sorting.
+//! The `k` nearest candidates of many stencil points at once, without sorting.
 //!
-//! Candidates are ranked by squared distance cut to 16 bits, so that a vector compares 32 of them. A threshold that
-//! exactly `k` ranks do not exceed gives the set. On a surface the count grows in proportion to the squared distance,
-//! so interpolation between counts finds it in a few rounds, and the six searches share their rounds.
+//! Candidates are ranked by squared distance cut to 15 bits. A row holds one candidate's ranks at 32 stencil points, so
+//! that vectors run over the points: a count at all of them is one comparison and one subtraction for each candidate.
+//! A threshold that exactly `k` ranks do not exceed gives the set. On a surface the count grows in proportion to the
+//! squared distance, so interpolation between counts comes close in a few rounds, and all searches share their rounds.
+//! The last steps go from rank to rank.
 //!
 //! Ranks are true to half a unit (the caller sees to it). So if no rank equals the threshold, everything below is
 //! nearer than everything above and the set is exact. Otherwise the threshold is the k-th lowest rank: lower ranks
 //! than its neighbours' are surely among the nearest, higher ones surely not, and [`undecided`] are the few between.
-#![allow(clippy::needless_range_loop, reason = "stencil points and axes run through several arrays at once")]
 
-use super::lanes::{Keys, Lanes, Set};
+use super::lanes::{Keys, LANES, Lanes, Row};
 
 /// Rank that stands for the distance up to which candidates are complete.
-pub(super) const COMPLETE: f64 = 65_500.0;
+pub(super) const COMPLETE: f64 = 32_700.0;
 
 /// Highest threshold: those undecided at it are still complete.
-const HIGHEST: i32 = 65_498;
+pub(super) const HIGHEST: i16 = 32_698;
+
+/// Rounds that count only; later ones also find the ranks on both sides of the threshold.
+const COUNTING: u32 = 3;
 
 /// Adding it rounds a number below 2^22 to an integer in the low bits: vectors have no saturating conversion.
 const INTEGER: f32 = 12_582_912.0;
 
-/// Thresholds at the six stencil points; and two idle lanes, which make a vector full.
-pub(super) type Thresholds = [i32; 8];
-
 /// Finds, from a first guess, the least ranks that at least `k` candidates do not exceed, or any thresholds that
 /// exactly `k` do not exceed. False where there are too few within reach.
 #[inline(always)]
-pub(super) fn search<L: Lanes>(lanes: L, keys: &Keys, k: i32, at: &mut Thresholds) -> bool {
+pub(super) fn search<L: Lanes>(lanes: L, keys: &Keys, k: i32, at: &mut Row) -> bool {
     let wanted = k as f32;
-    let mut low = [-1i32; 8];
-    let mut high = [HIGHEST + 1; 8];
-    let mut low_count = [0f32; 8];
-    let mut high_count = [0f32; 8];
-    for t in at.iter_mut() {
+    let mut low = [-1i32; LANES];
+    let mut high = [i32::from(HIGHEST) + 1; LANES];
+    let mut low_count = [0f32; LANES];
+    let mut high_count = [0f32; LANES];
+    for t in &mut at.0 {
         *t = (*t).clamp(0, HIGHEST);
     }
     for round in 1.. {
-        let mut counts = lanes.count(keys, at);
-        (counts[6], counts[7]) = (k, k);
-        let bisect = u32::is_multiple_of(round, 4);
-        let mut open = 0;
-        let mut lacking = 0;
-        for q in 0..8 {
-            let count = counts[q] as f32;
-            let (over, under) = (counts[q] > k, counts[q] < k);
-            high[q] = if over { at[q] } else { high[q] };
+        let bisect = u32::is_multiple_of(round, 5);
+        // Counts stay the same down to the rank below and up to the rank above.
+        let (counts, below, above) =
+            if round <= COUNTING { (lanes.count(keys, at), *at, *at) } else { lanes.count_between(keys, at) };
+        let one_by_one = if round <= COUNTING { 0 } else { 2 };
+        let (mut open, mut lacking) = (0, 0);
+        for q in 0..LANES {
+            let count = i32::from(counts.0[q]);
+            let (over, under) = (count > k, count < k);
+            let count = count as f32;
+            let from = i32::from(at.0[q]);
+            high[q] = if over { i32::from(below.0[q]) } else { high[q] };
             high_count[q] = if over { count } else { high_count[q] };
-            low[q] = if under { at[q] } else { low[q] };
+            low[q] = if under { i32::from(above.0[q]) } else { low[q] };
             low_count[q] = if under { count } else { low_count[q] };
-            let (l, h, t) = (low[q] as f32, high[q] as f32, at[q] as f32);
+            let (l, h, t) = (low[q] as f32, high[q] as f32, from as f32);
             let between = l + (h - l) * (wanted - low_count[q]) / (high_count[q] - low_count[q]);
             let beyond = t * (wanted + 0.5) / (count + 0.5) + 1.0;
             let next = if high_count[q] > 0.0 { between } else { beyond };
             let next = if bisect { (l + h) * 0.5 } else { next };
+            let step = if over { h - 1.0 } else { l + 2.0 };
+            let next = if (count - wanted).abs() <= one_by_one as f32 { step } else { next };
             let next = if next < h - 1.0 { next } else { h - 1.0 };
             let next = if next > l + 1.0 { next } else { l + 1.0 };
             let stuck = high[q] - low[q] <= 1;
             let next = if stuck { high[q] } else { (next + INTEGER).to_bits() as i32 - INTEGER.to_bits() as i32 };
-            at[q] = if over | under { next } else { at[q] };
+            at.0[q] = if over | under { next } else { from } as i16;
             open |= i32::from((over | under) & !stuck);
-            lacking |= i32::from(stuck & (high[q] > HIGHEST));
+            lacking |= i32::from(stuck & (high[q] > i32::from(HIGHEST)));
         }
         if lacking != 0 {
             return false;
@@ -71,17 +77,15 @@ pub(super) fn search<L: Lanes>(lanes: L, keys: &Keys, k: i32, at: &mut Threshold
     true
 }
 
-/// Candidates whose place at the threshold (the k-th lowest rank) ranks cannot tell; those surely nearer are put into
-/// `set`.
+/// Candidates whose place at the threshold (the k-th lowest rank) ranks cannot tell; the others' `of` says whether they
+/// are surely nearer.
 #[cold]
-pub(super) fn undecided(keys: &Keys, q: usize, threshold: i32, set: &mut Set) -> Vec<usize> {
+pub(super) fn undecided(keys: &Keys, lane: usize, threshold: i16, of: &mut [u32]) -> Vec<usize> {
     let mut between = Vec::new();
-    set.fill(0);
-    for (i, &rank) in keys.at(q).iter().enumerate() {
-        let above = i32::from(rank) - threshold;
-        if above < -1 {
-            set[i / 64] |= 1 << (i % 64);
-        } else if above <= 1 {
+    for (i, (row, of)) in keys.rows().iter().zip(of).enumerate() {
+        let above = i32::from(row.0[lane]) - i32::from(threshold);
+        *of = *of & !(1 << lane) | u32::from(above < -1) << lane;
+        if (-1..=1).contains(&above) {
             between.push(i);
         }
     }

@@ -7,6 +7,9 @@ use rayon::prelude::*;
 /// Columns that one thread works in a row.
 const RUN: usize = 32;
 
+/// Runs of each thread, before their values are put in place.
+const TURN: usize = 64;
+
 /// Points in the order of their columns, to be worked together.
 pub(super) struct Visits {
     /// Points, column by column.
@@ -50,24 +53,29 @@ impl Visits {
     ) -> Vec<Option<f64>> {
         let columns = self.start.len() - 1;
         let runs = columns.div_ceil(RUN);
-        let found: Vec<Vec<Option<f64>>> = (0..runs)
-            .into_par_iter()
-            .map_init(workspace, |state, run| {
-                let columns = run * RUN..((run + 1) * RUN).min(columns);
-                let first = self.start[columns.start] as usize;
-                let mut found = vec![None; self.start[columns.end] as usize - first];
-                for column in columns {
-                    let (a, b) = (self.start[column] as usize, self.start[column + 1] as usize);
-                    if a < b {
-                        work(state, &self.order[a..b], &mut found[a - first..b - first]);
-                    }
-                }
-                found
-            })
-            .collect();
+        // In turns, so that values are not kept twice.
+        let turn = TURN * rayon::current_num_threads();
         let mut values = vec![None; self.order.len()];
-        for (&point, value) in self.order.iter().zip(found.iter().flatten()) {
-            values[point as usize] = *value;
+        for first in (0..runs).step_by(turn) {
+            let found: Vec<Vec<Option<f64>>> = (first..(first + turn).min(runs))
+                .into_par_iter()
+                .map_init(&workspace, |state, run| {
+                    let columns = run * RUN..((run + 1) * RUN).min(columns);
+                    let first = self.start[columns.start] as usize;
+                    let mut found = vec![None; self.start[columns.end] as usize - first];
+                    for column in columns {
+                        let (a, b) = (self.start[column] as usize, self.start[column + 1] as usize);
+                        if a < b {
+                            work(state, &self.order[a..b], &mut found[a - first..b - first]);
+                        }
+                    }
+                    found
+                })
+                .collect();
+            let points = &self.order[self.start[first * RUN] as usize..];
+            for (&point, value) in points.iter().zip(found.iter().flatten()) {
+                values[point as usize] = *value;
+            }
         }
         values
     }

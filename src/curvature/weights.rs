@@ -86,14 +86,10 @@ pub(super) fn rounded(x: f64) -> i64 {
     ((x + ROUND).to_bits() as i64).wrapping_sub(ROUND.to_bits() as i64)
 }
 
-/// What rounding leaves in the sum of the bits of as many rounded numbers as the set has members.
+/// What rounding leaves in the sum of the bits of as many rounded numbers.
 #[inline(always)]
-pub(super) fn surplus(set: &[u64]) -> i64 {
-    let mut count = 0;
-    for word in set {
-        count += word.count_ones();
-    }
-    (ROUND.to_bits() as i64).wrapping_mul(i64::from(count))
+pub(super) fn surplus(count: usize) -> i64 {
+    (ROUND.to_bits() as i64).wrapping_mul(count as i64)
 }
 
 /// The divergence from the sums at +x, -x, +y, -y, +z, -z; 1/m.
