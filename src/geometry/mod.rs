@@ -4,6 +4,8 @@
 //! z up, relative to an origin near the survey, so that `f64` keeps nanometres.
 
 mod hull;
+mod polytope;
+mod quickhull;
 
 pub use glam::DVec3;
 pub use hull::{Hull, flatter_than, hull, sphericity};

@@ -41,17 +41,16 @@ pub fn axes(points: &[DVec3]) -> Axes {
         }
     }
     let eigen = SymmetricEigen::new(covariance / n);
-    let mut sorted: Vec<(f64, DVec3)> = (0..3)
-        .map(|k| {
-            let v = eigen.eigenvectors.column(k);
-            let v = DVec3::new(v[0], v[1], v[2]).normalize_or(DVec3::AXES[k]);
-            let (low, high) = points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &p| {
-                let x = v.dot(p - mean);
-                (low.min(x), high.max(x))
-            });
-            (high - low, v)
-        })
-        .collect();
+    let directions = [0, 1, 2].map(|k| {
+        let v = eigen.eigenvectors.column(k);
+        DVec3::new(v[0], v[1], v[2]).normalize_or(DVec3::AXES[k])
+    });
+    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for &p in points {
+        let along = DVec3::from_array(directions.map(|v| v.dot(p - mean)));
+        (low, high) = (low.min(along), high.max(along));
+    }
+    let mut sorted = [0, 1, 2].map(|k| ((high - low)[k], directions[k]));
     sorted.sort_by(|a, b| b.0.total_cmp(&a.0));
     Axes { extents_m: [sorted[0].0, sorted[1].0, sorted[2].0], directions: turned(sorted[0].1, sorted[2].1) }
 }

@@ -79,8 +79,14 @@ impl Normal {
                 2.0 * p.z,
                 1.0,
             ]);
-            scatter.ger(1.0, &d, &d, 1.0);
+            // The lower half; the matrix is symmetric.
+            for j in 0..10 {
+                for i in j..10 {
+                    scatter[(i, j)] += d[i] * d[j];
+                }
+            }
         }
+        scatter.fill_upper_triangle_with_lower_triangle();
         let s11: Matrix6<f64> = scatter.fixed_view::<6, 6>(0, 0).into_owned();
         let s12: Matrix6x4<f64> = scatter.fixed_view::<6, 4>(0, 6).into_owned();
         let s22: Matrix4<f64> = scatter.fixed_view::<4, 4>(6, 6).into_owned();

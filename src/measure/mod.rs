@@ -5,12 +5,14 @@ mod axes;
 mod ellipsoid;
 mod grain;
 mod outline;
+mod patch;
 pub mod shape;
 
 pub use axes::{Axes, axes};
 pub use ellipsoid::ellipsoid_axes;
 pub use grain::{Grain, Polygon};
 pub use outline::outline;
+pub use patch::Patch;
 
 use crate::geometry::{DVec3, hull, triangle_area, triangle_centroid};
 use crate::segment::Segment;
@@ -35,24 +37,23 @@ pub fn measure(
     wanted: Wanted,
     color: &(dyn Fn(u32) -> Option<[f64; 3]> + Sync),
 ) -> Grain {
-    let triangles = &segment.triangles;
-    let vertices = mesh.vertices_of(triangles);
-    let points: Vec<DVec3> = vertices.iter().map(|&v| mesh.positions[v as usize]).collect();
-    let box_axes = axes(&points);
-    let hull = hull(&points);
-    let (outline, footprint_area_m2) = outline(mesh, triangles, wanted.outline_step_m);
-    let (centroid, surface_area_m2) = centroid_and_area(mesh, triangles);
-    let (color_mean, color_std) = colors(vertices.iter().map(|&v| color(v)));
-    let ids = || triangles.iter().map(|&t| mesh.triangle_id(t));
+    let patch = Patch::of(mesh, &segment.triangles);
+    let points = &patch.points;
+    let box_axes = axes(points);
+    let hull = hull(points);
+    let (outline, footprint_area_m2) = outline(&patch, wanted.outline_step_m);
+    let (centroid, surface_area_m2) = centroid_and_area(&patch);
+    let (color_mean, color_std) = colors(patch.vertices.iter().map(|&v| color(v)));
+    let ids = || segment.triangles.iter().map(|&t| mesh.triangle_id(t));
     Grain {
         anchor: ids().next().unwrap_or(u64::MAX),
-        triangles: triangles.len() as u64,
-        vertices: vertices.len() as u64,
+        triangles: segment.triangles.len() as u64,
+        vertices: points.len() as u64,
         centroid,
         top_z: points.iter().fold(f64::NEG_INFINITY, |top, p| top.max(p.z)),
         axes_m: box_axes.extents_m,
         directions: box_axes.directions,
-        ellipsoid_axes_m: ellipsoid_axes(&points),
+        ellipsoid_axes_m: ellipsoid_axes(points),
         surface_area_m2,
         hull_area_m2: hull.map_or(f64::NAN, |h| h.area_m2),
         hull_volume_m3: hull.map_or(f64::NAN, |h| h.volume_m3),
@@ -66,12 +67,10 @@ pub fn measure(
 }
 
 /// Area-weighted centroid (local metres) and area (m²).
-fn centroid_and_area(mesh: &TileMesh, triangles: &[u32]) -> (DVec3, f64) {
-    let Some(&first) = triangles.first() else { return (DVec3::ZERO, 0.0) };
-    let origin = mesh.corners(first)[0];
+fn centroid_and_area(patch: &Patch) -> (DVec3, f64) {
+    let Some([origin, ..]) = patch.triangles().next() else { return (DVec3::ZERO, 0.0) };
     let (mut moment, mut area) = (DVec3::ZERO, 0.0);
-    for &t in triangles {
-        let corners = mesh.corners(t);
+    for corners in patch.triangles() {
         let a = triangle_area(corners);
         moment += (triangle_centroid(corners) - origin) * a;
         area += a;
@@ -80,16 +79,16 @@ fn centroid_and_area(mesh: &TileMesh, triangles: &[u32]) -> (DVec3, f64) {
 }
 
 /// Mean and population standard deviation of the vertices' colours; none where one has none.
-fn colors(colors: impl Iterator<Item = Option<[f64; 3]>> + Clone) -> (Option<[f64; 3]>, Option<[f64; 3]>) {
-    let (mut sum, mut n) = ([0.0; 3], 0.0);
-    for color in colors.clone() {
-        let Some(color) = color else { return (None, None) };
+fn colors(colors: impl Iterator<Item = Option<[f64; 3]>>) -> (Option<[f64; 3]>, Option<[f64; 3]>) {
+    let Some(colors) = colors.collect::<Option<Vec<[f64; 3]>>>() else { return (None, None) };
+    let n = colors.len() as f64;
+    let mut sum = [0.0; 3];
+    for color in &colors {
         (0..3).for_each(|i| sum[i] += color[i]);
-        n += 1.0;
     }
     let mean = sum.map(|s| s / n);
     let mut square = [0.0; 3];
-    for color in colors.flatten() {
+    for color in &colors {
         (0..3).for_each(|i| square[i] += (color[i] - mean[i]).powi(2));
     }
     (Some(mean), Some(square.map(|s| (s / n).sqrt())))

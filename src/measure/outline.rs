@@ -9,25 +9,30 @@
 //! there stays valid wherever an offset moves it.
 
 use super::grain::Polygon;
+use super::patch::Patch;
 use crate::geometry::DVec3;
-use crate::tile::TileMesh;
 use i_overlay::core::fill_rule::FillRule;
 use i_overlay::core::overlay::{IntOverlayOptions, Overlay, ShapeType};
 use i_overlay::core::overlay_rule::OverlayRule;
 use i_overlay::core::solver::Solver;
 use i_overlay::i_float::int::point::IntPoint;
 
-/// Outline of some triangles, and its area in m². `step_m` is the grid's step.
-pub fn outline(mesh: &TileMesh, triangles: &[u32], step_m: f64) -> (Vec<Polygon>, f64) {
-    let Some(&first) = triangles.first() else { return (Vec::new(), 0.0) };
+/// Outline of a grain, and its area in m². `step_m` is the grid's step.
+pub fn outline(patch: &Patch, step_m: f64) -> (Vec<Polygon>, f64) {
+    let Some(first) = patch.corners.first() else { return (Vec::new(), 0.0) };
     let steps = |p: DVec3| [(p.x / step_m).round() as i64, (p.y / step_m).round() as i64];
-    let origin = steps(mesh.corners(first)[0]);
-    let place = |v: u32| {
-        let [x, y] = steps(mesh.positions[v as usize]);
-        IntPoint::new(clamp(x - origin[0]), clamp(y - origin[1]))
-    };
+    let origin = steps(patch.points[first[0] as usize]);
+    let places: Vec<IntPoint<i32>> = patch
+        .points
+        .iter()
+        .map(|&p| {
+            let [x, y] = steps(p);
+            IntPoint::new(clamp(x - origin[0]), clamp(y - origin[1]))
+        })
+        .collect();
     let mut overlay: Overlay<i32> = Overlay::new_custom(256, IntOverlayOptions::ogc(), Solver::default());
-    for chain in chains(mesh, triangles, &place) {
+    for chain in walk(&uncancelled(&patch.corners, &places)) {
+        let chain: Vec<IntPoint<i32>> = chain.into_iter().map(|v| places[v as usize]).collect();
         overlay.add_contour(&chain, ShapeType::Subject);
     }
     let shapes = overlay.overlay(OverlayRule::Subject, FillRule::NonZero);
@@ -64,31 +69,53 @@ fn twice_area(ring: &[[i64; 2]]) -> i128 {
         .sum()
 }
 
-/// Closed chains of the edges that do not cancel, each from its lowest vertex on.
-fn chains(mesh: &TileMesh, triangles: &[u32], place: &dyn Fn(u32) -> IntPoint<i32>) -> Vec<Vec<IntPoint<i32>>> {
-    let mut directed: Vec<(u32, u32, i32)> = Vec::with_capacity(triangles.len() * 3);
-    for &t in triangles {
-        let corners = mesh.triangles[t as usize];
-        let [a, b, c] = corners.map(place);
-        let (ab, ac) = ((b.x - a.x, b.y - a.y), (c.x - a.x, c.y - a.y));
-        let turn = i64::from(ab.0) * i64::from(ac.1) - i64::from(ab.1) * i64::from(ac.0);
-        if turn == 0 {
-            continue;
-        }
-        let [u, v, w] = if turn > 0 { corners } else { [corners[0], corners[2], corners[1]] };
-        for (from, to) in [(u, v), (v, w), (w, u)] {
-            directed.push(if from < to { (from, to, 1) } else { (to, from, -1) });
-        }
+/// Directed edges that are left when opposite ones cancel, sorted.
+fn uncancelled(triangles: &[[u32; 3]], places: &[IntPoint<i32>]) -> Vec<(u32, u32)> {
+    // Edges are listed by their lower vertex: the other one, and in the last bit whether they descend.
+    let edges = || {
+        triangles
+            .iter()
+            .filter_map(|corners| turned(*corners, places))
+            .flat_map(|[a, b, c]| [(a, b), (b, c), (c, a)])
+            .map(|(from, to)| if from < to { (from, u64::from(to) << 1) } else { (to, u64::from(from) << 1 | 1) })
+    };
+    let mut begin = vec![0u32; places.len() + 1];
+    edges().for_each(|(lower, _)| begin[lower as usize] += 1);
+    let mut sum = 0;
+    for place in &mut begin {
+        (*place, sum) = (sum, sum + *place);
     }
-    directed.sort_unstable();
+    let mut listed = vec![0u64; sum as usize];
+    let mut end = begin.clone();
+    for (lower, edge) in edges() {
+        listed[end[lower as usize] as usize] = edge;
+        end[lower as usize] += 1;
+    }
     let mut left: Vec<(u32, u32)> = Vec::new();
-    for run in directed.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)) {
-        let count: i32 = run.iter().map(|e| e.2).sum();
-        let edge = if count > 0 { (run[0].0, run[0].1) } else { (run[0].1, run[0].0) };
-        left.extend(std::iter::repeat_n(edge, count.unsigned_abs() as usize));
+    for (lower, range) in (0u32..).zip(begin.windows(2)) {
+        let around = &mut listed[range[0] as usize..range[1] as usize];
+        around.sort_unstable();
+        for run in around.chunk_by(|x, y| x >> 1 == y >> 1) {
+            let higher = (run[0] >> 1) as u32;
+            let down = run.iter().filter(|&edge| edge & 1 == 1).count();
+            let up = run.len() - down;
+            let edge = if up > down { (lower, higher) } else { (higher, lower) };
+            left.extend(std::iter::repeat_n(edge, up.abs_diff(down)));
+        }
     }
     left.sort_unstable();
-    walk(&left).into_iter().map(|chain| chain.into_iter().map(place).collect()).collect()
+    left
+}
+
+/// The triangle counter-clockwise in plan; none if it is a line there.
+fn turned([a, b, c]: [u32; 3], places: &[IntPoint<i32>]) -> Option<[u32; 3]> {
+    let [p, q, r] = [a, b, c].map(|v| places[v as usize]);
+    let turn = i64::from(q.x - p.x) * i64::from(r.y - p.y) - i64::from(q.y - p.y) * i64::from(r.x - p.x);
+    match turn.signum() {
+        0 => None,
+        1 => Some([a, b, c]),
+        _ => Some([a, c, b]),
+    }
 }
 
 /// Splits balanced directed edges (as many arrive at a vertex as leave it) into closed chains.
@@ -120,18 +147,18 @@ fn walk(edges: &[(u32, u32)]) -> Vec<Vec<u32>> {
 mod tests {
     use super::*;
 
-    fn mesh(points: &[[f64; 3]], triangles: &[[u32; 3]]) -> TileMesh {
-        TileMesh {
-            positions: points.iter().map(|&p| DVec3::from_array(p)).collect(),
-            triangles: triangles.to_vec(),
-            ..TileMesh::default()
+    fn patch(points: &[[f64; 3]], triangles: &[[u32; 3]]) -> Patch {
+        Patch {
+            points: points.iter().map(|&p| DVec3::from_array(p)).collect(),
+            corners: triangles.to_vec(),
+            ..Patch::default()
         }
     }
 
     #[test]
     fn inner_edges_vanish_and_the_area_is_that_of_the_square() {
-        let m = mesh(&[[0., 0., 0.], [1., 0., 1.], [1., 1., 0.], [0., 1., 2.]], &[[0, 1, 2], [0, 2, 3]]);
-        let (polygons, area) = outline(&m, &[0, 1], 1.0 / 1024.0);
+        let m = patch(&[[0., 0., 0.], [1., 0., 1.], [1., 1., 0.], [0., 1., 2.]], &[[0, 1, 2], [0, 2, 3]]);
+        let (polygons, area) = outline(&m, 1.0 / 1024.0);
         assert_eq!((polygons.len(), polygons[0].len(), polygons[0][0].len()), (1, 1, 4));
         assert!((area - 1.0).abs() < 1e-12, "{area}");
     }
@@ -139,7 +166,7 @@ mod tests {
     #[test]
     fn an_overhang_counts_once_and_sticks_out() {
         // A strip that runs east, folds back under itself and ends further east below.
-        let m = mesh(
+        let m = patch(
             &[
                 [0., 0., 2.],
                 [2., 0., 2.],
@@ -152,7 +179,7 @@ mod tests {
             ],
             &[[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 2], [4, 6, 7], [4, 7, 5]],
         );
-        let (polygons, area) = outline(&m, &[0, 1, 2, 3, 4, 5], 1.0 / 1024.0);
+        let (polygons, area) = outline(&m, 1.0 / 1024.0);
         assert_eq!(polygons.len(), 1);
         assert!((area - 4.0).abs() < 1e-12, "{area}: {polygons:?}");
     }
@@ -163,7 +190,7 @@ mod tests {
         let points: Vec<[f64; 3]> = square(2.0).into_iter().chain(square(1.0)).collect();
         let triangles: Vec<[u32; 3]> =
             (0..4).flat_map(|i| [[i, (i + 1) % 4, i + 4], [(i + 1) % 4, (i + 1) % 4 + 4, i + 4]]).collect();
-        let (polygons, area) = outline(&mesh(&points, &triangles), &[0, 1, 2, 3, 4, 5, 6, 7], 1.0 / 1024.0);
+        let (polygons, area) = outline(&patch(&points, &triangles), 1.0 / 1024.0);
         assert_eq!((polygons.len(), polygons[0].len()), (1, 2));
         assert!((area - 12.0).abs() < 1e-12, "{area}");
     }
