@@ -183,11 +183,12 @@ impl Survey<'_> {
         loop {
             let divergence: Vec<f64> = mesh.vertex_ids.iter().map(|&v| recipe.divergence[v as usize]).collect();
             let found = segment(&mesh, &divergence, &self.index.scale, recipe.settings, &mut |_, _| {});
-            if found.unsettled == 0 {
+            if found.is_complete() {
                 return self.publish(tile, &mesh, found, recipe, (halo_m, attempts));
             }
             let whole = mesh.triangle_ids.len() as u64 == self.index.scale.triangles;
-            assert!(!whole, "{} core triangles are unknown though the whole survey is loaded", found.unsettled);
+            let (unsettled, open) = (found.unsettled.len(), found.oversize_open);
+            assert!(!whole, "{unsettled} core triangles and {open} edges are unknown in the whole survey");
             halo_m *= 1.5;
             attempts += 1;
             let block = self.with_halo(&tile.core, halo_m);

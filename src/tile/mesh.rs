@@ -62,6 +62,21 @@ impl TileMesh {
         TileMesh { vertex_ids, positions, complete, triangle_ids, triangles, areas_m2, in_core }
     }
 
+    /// Global id of a vertex; ascends with the local number.
+    pub fn vertex_id(&self, vertex: u32) -> u64 {
+        self.vertex_ids[vertex as usize]
+    }
+
+    /// Global id of a triangle; ascends with the local number.
+    pub fn triangle_id(&self, triangle: u32) -> u64 {
+        self.triangle_ids[triangle as usize]
+    }
+
+    /// Area of a triangle, m².
+    pub fn area_m2(&self, triangle: u32) -> f64 {
+        triangle_area(self.corners(triangle))
+    }
+
     /// The corners of a triangle, local metres.
     pub fn corners(&self, triangle: u32) -> [DVec3; 3] {
         self.triangles[triangle as usize].map(|v| self.positions[v as usize])
