@@ -14,13 +14,9 @@ pub struct Adjacency {
     /// Where the triangles of each fork begin, and the end of the last.
     fork_starts: Vec<u32>,
     fork_triangles: Vec<u32>,
-    flags: Vec<u8>,
+    open: Vec<u32>,
+    at_mesh_edge: Vec<u32>,
 }
-
-/// A triangle beyond the halo may lie at one of its edges.
-const OPEN: u8 = 1;
-/// One of its edges is an edge of the mesh.
-const AT_MESH_EDGE: u8 = 2;
 
 /// A side of a triangle, kept with the lower of its vertices: the higher vertex above, 4 triangle + side below.
 #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -71,7 +67,8 @@ impl Adjacency {
             sides: (0..n as u32).map(|t| [t; 3]).collect(),
             fork_starts: vec![0],
             fork_triangles: Vec::new(),
-            flags: vec![0; n],
+            open: Vec::new(),
+            at_mesh_edge: Vec::new(),
         };
         let mut first = 0;
         for low in 0..mesh.positions.len() {
@@ -79,57 +76,93 @@ impl Adjacency {
             adjacency.pair_up(mesh, low as u32, &mut halves[first..last]);
             first = last;
         }
+        drop(halves);
+        adjacency.find_copies(mesh);
+        for list in [&mut adjacency.open, &mut adjacency.at_mesh_edge] {
+            list.sort_unstable();
+            list.dedup();
+        }
         adjacency
     }
 
     /// Tells the edges at one vertex apart that lead to higher ones.
-    fn pair_up(&mut self, mesh: &TileMesh, low: u32, list: &mut [Half]) {
-        let sorted = list.len() > FEW;
-        if sorted {
+    fn pair_up(&mut self, mesh: &TileMesh, low: u32, mut list: &mut [Half]) {
+        if list.len() > FEW {
             list.sort_unstable();
-        }
-        let mut from = 0;
-        while from < list.len() {
-            let high = list[from].high();
-            let mut to = from + 1;
-            for i in to..list.len() {
-                if list[i].high() == high {
-                    list.swap(i, to);
-                    to += 1;
-                } else if sorted {
-                    break;
-                }
+            for around in list.chunk_by(|a, b| a.high() == b.high()) {
+                self.join(mesh, low, around);
             }
-            self.join(mesh, [low, high], &list[from..to]);
-            from = to;
+            return;
+        }
+        let complete = mesh.complete[low as usize];
+        while let Some(&first) = list.first() {
+            // Without a branch for each: whether two lead to the same vertex is as good as random.
+            let (mut others, mut place) = (0, 0);
+            for (i, half) in list.iter().enumerate().skip(1) {
+                let same = half.high() == first.high();
+                others += usize::from(same);
+                place = if same { i } else { place };
+            }
+            match others {
+                0 => {}
+                1 => list.swap(1, place),
+                _ => list.sort_unstable_by_key(|h| (h.high() != first.high(), *h)),
+            }
+            let (around, rest) = list.split_at_mut(1 + others);
+            match *around {
+                [a, b] if complete && a.triangle() != b.triangle() => self.pair(a, b),
+                _ => self.join(mesh, low, around),
+            }
+            list = rest;
         }
     }
 
+    fn pair(&mut self, a: Half, b: Half) {
+        self.sides[a.triangle() as usize][a.side()] = b.triangle();
+        self.sides[b.triangle() as usize][b.side()] = a.triangle();
+    }
+
     /// Notes what lies at one edge.
-    fn join(&mut self, mesh: &TileMesh, ends: [u32; 2], around: &[Half]) {
-        // Around a complete vertex everything is loaded, so an edge can only lack a triangle where both its
-        // ends are incomplete.
-        let open = ends.iter().all(|&v| !mesh.complete[v as usize]);
+    fn join(&mut self, mesh: &TileMesh, low: u32, around: &[Half]) {
+        let high = around[0].high();
         let lone = match *around {
             [_] => true,
             [a, b] if a.triangle() != b.triangle() => {
-                self.sides[a.triangle() as usize][a.side()] = b.triangle();
-                self.sides[b.triangle() as usize][b.side()] = a.triangle();
-                // They share two corners: are the third ones the same too?
-                let mixed = |h: Half| mesh.triangles[h.triangle() as usize].into_iter().fold(0, |m, v| m ^ v);
-                mixed(a) == mixed(b)
+                self.pair(a, b);
+                // Unless one is a copy of the other, which is looked for at the end.
+                false
             }
             _ => {
                 self.join_many(around);
                 lone(mesh, around)
             }
         };
-        let flag = match (open, lone && ends[0] != ends[1]) {
-            (true, _) => OPEN,
-            (false, true) => AT_MESH_EDGE,
-            (false, false) => return,
-        };
-        around.iter().for_each(|h| self.flags[h.triangle() as usize] |= flag);
+        if may_lack(mesh, low, high) {
+            self.open.extend(around.iter().map(|h| h.triangle()));
+        } else if lone && low != high {
+            self.at_mesh_edge.extend(around.iter().map(|h| h.triangle()));
+        }
+    }
+
+    /// Two copies of a face do not continue each other: the mesh ends where only they lie. They have three
+    /// edges in common, so two sides have the same neighbour, or two edges are forks.
+    fn find_copies(&mut self, mesh: &TileMesh) {
+        let mut suspects = self.fork_triangles.clone();
+        for (t, &[a, b, c]) in self.sides.iter().enumerate() {
+            let own = t as u32;
+            if (a == b && b != own) || (b == c && c != own) || (c == a && a != own) {
+                suspects.push(own);
+            }
+        }
+        for t in suspects {
+            let [a, b, c] = mesh.triangles[t as usize];
+            for (side, [v, w]) in self.sides[t as usize].into_iter().zip([[a, b], [b, c], [c, a]]) {
+                let both = [t, side].map(|t| real_corners(mesh, t));
+                if side != t && both[0].is_some() && both[0] == both[1] && !may_lack(mesh, v, w) {
+                    self.at_mesh_edge.push(t);
+                }
+            }
+        }
     }
 
     /// A face that names a vertex twice lies at an edge twice, and is no fork by that.
@@ -171,32 +204,35 @@ impl Adjacency {
         self.fork_starts.windows(2).map(|w| &self.fork_triangles[w[0] as usize..w[1] as usize])
     }
 
-    /// Whether a triangle beyond the halo may lie at an edge of the triangle.
-    pub fn is_open(&self, triangle: usize) -> bool {
-        self.flags[triangle] & OPEN != 0
+    /// Triangles, ascending, at an edge of which a triangle beyond the halo may lie.
+    pub fn open(&self) -> &[u32] {
+        &self.open
     }
 
-    /// Whether the mesh ends at an edge of the triangle, as far as that is known.
-    pub fn is_at_mesh_edge(&self, triangle: usize) -> bool {
-        self.flags[triangle] & AT_MESH_EDGE != 0
+    /// Triangles, ascending, at an edge of which the mesh ends, as far as that is known.
+    pub fn at_mesh_edge(&self) -> &[u32] {
+        &self.at_mesh_edge
     }
+}
+
+/// Around a complete vertex everything is loaded, so an edge can only lack a triangle where both its ends are
+/// incomplete.
+fn may_lack(mesh: &TileMesh, v: u32, w: u32) -> bool {
+    !mesh.complete[v as usize] && !mesh.complete[w as usize]
+}
+
+/// The corners of a face, ascending; none if it names a vertex twice.
+fn real_corners(mesh: &TileMesh, triangle: u32) -> Option<[u32; 3]> {
+    let mut corners = mesh.triangles[triangle as usize];
+    corners.sort_unstable();
+    (corners[0] < corners[1] && corners[1] < corners[2]).then_some(corners)
 }
 
 /// Whether only one triangle lies at an edge. Faces that name a vertex twice, and copies of a face, do not
 /// count.
 fn lone(mesh: &TileMesh, around: &[Half]) -> bool {
-    let mut only = None;
-    for h in around {
-        let mut corners = mesh.triangles[h.triangle() as usize];
-        corners.sort_unstable();
-        if corners[0] == corners[1] || corners[1] == corners[2] {
-            continue;
-        }
-        if *only.get_or_insert(corners) != corners {
-            return false;
-        }
-    }
-    only.is_some()
+    let mut real = around.iter().filter_map(|h| real_corners(mesh, h.triangle()));
+    real.next().is_some_and(|first| real.all(|other| other == first))
 }
 
 #[cfg(test)]
@@ -219,7 +255,7 @@ mod tests {
         assert_eq!(adjacency.forks().collect::<Vec<_>>(), [[0, 1, 2]]);
         let sides: Vec<_> = (0..5).map(|t| adjacency.sides(t)).collect();
         assert_eq!(sides, [[0, 0, 0], [1, 4, 1], [2, 2, 4], [3, 3, 3], [4, 2, 1]]);
-        assert_eq!((0..5).map(|t| adjacency.is_at_mesh_edge(t)).collect::<Vec<_>>(), [true, true, true, false, true]);
+        assert_eq!((adjacency.open(), adjacency.at_mesh_edge()), (&[][..], &[0, 1, 2, 4][..]));
     }
 
     /// Edge by edge, in a map, as one would write it down.
@@ -275,7 +311,8 @@ mod tests {
                     list
                 };
                 assert_eq!(each_once(found), each_once(beside[t].clone()), "{triangles:?}, triangle {t}");
-                assert_eq!([adjacency.is_open(t), adjacency.is_at_mesh_edge(t)], flags[t], "{triangles:?}, {t}");
+                let listed = [adjacency.open(), adjacency.at_mesh_edge()].map(|l| l.binary_search(&alone).is_ok());
+                assert_eq!(listed, flags[t], "{triangles:?}, triangle {t}");
                 open += usize::from(flags[t][0]);
                 edges += usize::from(flags[t][1]);
             }

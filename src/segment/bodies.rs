@@ -3,7 +3,7 @@
 use super::Sizes;
 use super::adjacency::Adjacency;
 use super::components::{Components, join_all, root};
-use super::state::{Labels, NONE, OVERSIZE, State};
+use super::state::{Labels, NONE, OVERSIZE, State, unknown};
 use crate::settings::SegmentSettings;
 use crate::tile::TileMesh;
 
@@ -29,8 +29,9 @@ pub fn tell_apart(
     // Whatever the truth is, a body contains its kept component, and lies within the possible one.
     let kept = Components::of(adjacency, |t| state[t] == State::Kept);
     let size = kept.sizes(mesh, sizes);
-    let open = kept.any(|t| adjacency.is_open(t));
-    let doubtful = kept.beside(adjacency, |t| state[t] == State::Unknown);
+    let open = kept.holding(adjacency.open());
+    let unknown = unknown(&state);
+    let doubtful = kept.beside(adjacency, &unknown);
     let wide = kept.wider_than(mesh, settings.max_grain_m, |part| size[part] >= sizes.smallest);
     let fate: Vec<Fate> = (0..kept.len())
         .map(|part| match (size[part] >= sizes.smallest, !open[part] && !doubtful[part]) {
@@ -40,7 +41,7 @@ pub fn tell_apart(
             (_, false) => Fate::Unknown,
         })
         .collect();
-    let Possible { node: mut label, too_small } = Possible::of(mesh, adjacency, sizes, &state, kept.of, (size, open));
+    let Possible { node: mut label, too_small } = Possible::of(mesh, adjacency, sizes, &unknown, kept.of, (size, open));
     for (state, label) in state.iter_mut().zip(&mut label).filter(|(_, node)| **node != NONE) {
         let node = *label as usize;
         let fate = if too_small[node] { Fate::Gone } else { *fate.get(node).unwrap_or(&Fate::Unknown) };
@@ -67,17 +68,16 @@ impl Possible {
         mesh: &TileMesh,
         adjacency: &Adjacency,
         sizes: &Sizes,
-        state: &[State],
+        unknown: &[u32],
         mut node: Vec<u32>,
         (mut size, mut open): (Vec<u64>, Vec<bool>),
     ) -> Possible {
         let kept = size.len();
-        let unknown: Vec<u32> = (0..state.len() as u32).filter(|&t| state[t as usize] == State::Unknown).collect();
         let mut parent: Vec<u32> = (0..(kept + unknown.len()) as u32).collect();
         for (i, &t) in unknown.iter().enumerate() {
             node[t as usize] = (kept + i) as u32;
         }
-        for &t in &unknown {
+        for &t in unknown {
             for side in adjacency.sides(t as usize).map(|s| node[s as usize]).into_iter().filter(|&s| s != NONE) {
                 join_all(&mut parent, [node[t as usize], side].into_iter());
             }
@@ -88,17 +88,15 @@ impl Possible {
         // Roots are the lowest of their nodes, so what a node adds goes to one that is summed already.
         size.resize(parent.len(), 0);
         open.resize(parent.len(), false);
+        adjacency.open().iter().map(|&t| node[t as usize]).filter(|&i| i != NONE).for_each(|i| open[i as usize] = true);
         for i in 0..parent.len() {
             let whole = root(&mut parent, i as u32) as usize;
             parent[i] = whole as u32;
+            open[whole] |= open[i];
             if i < kept && whole != i {
                 size[whole] = size[whole].saturating_add(size[i]);
-                open[whole] |= open[i];
-            } else if let Some(&t) = i.checked_sub(kept).and_then(|i| unknown.get(i)) {
-                open[whole] |= adjacency.is_open(t as usize);
-                if size[whole] < sizes.smallest {
-                    size[whole] += sizes.of(mesh, t);
-                }
+            } else if i >= kept && size[whole] < sizes.smallest {
+                size[whole] += sizes.of(mesh, unknown[i - kept]);
             }
         }
         let too_small = parent.iter().map(|&whole| !open[whole as usize] && size[whole as usize] < sizes.smallest);

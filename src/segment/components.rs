@@ -68,32 +68,31 @@ impl Components {
         size
     }
 
-    /// Which components have a triangle for which `holds` is true.
-    pub fn any(&self, holds: impl Fn(usize) -> bool) -> Vec<bool> {
-        let mut any = vec![false; self.len()];
-        for (t, &part) in self.of.iter().enumerate() {
-            if let Some(any) = any.get_mut(part as usize) {
-                *any |= holds(t);
-            }
+    /// Which components hold one of these triangles.
+    pub fn holding(&self, triangles: &[u32]) -> Vec<bool> {
+        let mut holding = vec![false; self.len()];
+        for &t in triangles {
+            self.mark(t, &mut holding);
         }
-        any
+        holding
     }
 
-    /// Which components lie side by side with a triangle, not of theirs, for which `holds` is true.
-    pub fn beside(&self, adjacency: &Adjacency, holds: impl Fn(usize) -> bool) -> Vec<bool> {
+    /// Which components lie side by side with one of these triangles, which are of none; ascending.
+    pub fn beside(&self, adjacency: &Adjacency, triangles: &[u32]) -> Vec<bool> {
         let mut beside = vec![false; self.len()];
-        let mut mark = |t: u32| {
-            if let Some(beside) = beside.get_mut(self.of[t as usize] as usize) {
-                *beside = true;
-            }
-        };
-        for t in (0..adjacency.len()).filter(|&t| holds(t)) {
-            adjacency.sides(t).into_iter().for_each(&mut mark);
+        for &t in triangles {
+            adjacency.sides(t as usize).into_iter().for_each(|t| self.mark(t, &mut beside));
         }
-        for fork in adjacency.forks().filter(|f| f.iter().any(|&t| holds(t as usize))) {
-            fork.iter().copied().for_each(&mut mark);
+        for fork in adjacency.forks().filter(|f| f.iter().any(|t| triangles.binary_search(t).is_ok())) {
+            fork.iter().for_each(|&t| self.mark(t, &mut beside));
         }
         beside
+    }
+
+    fn mark(&self, triangle: u32, marks: &mut [bool]) {
+        if let Some(mark) = marks.get_mut(self.of[triangle as usize] as usize) {
+            *mark = true;
+        }
     }
 
     /// Which components, of those asked for, are wider in plan than so many metres; none is for 0.

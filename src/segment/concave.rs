@@ -41,7 +41,7 @@ pub fn too_tall(mesh: &TileMesh, settings: &SegmentSettings) -> Vec<u32> {
 /// enough; else it is unknown.
 pub fn give_back_dents(mesh: &TileMesh, adjacency: &Adjacency, sizes: &Sizes, state: &mut [State]) {
     let concave = Components::of(adjacency, |t| state[t] == State::Removed);
-    let open = concave.any(|t| adjacency.is_open(t));
+    let open = concave.holding(adjacency.open());
     let becomes: Vec<State> = concave
         .sizes(mesh, sizes)
         .into_iter()

@@ -27,7 +27,7 @@ pub fn fill_holes(mesh: &TileMesh, adjacency: &Adjacency, settings: &SegmentSett
     let undecided = |pocket: usize| contact[pocket] & !UNSURE != SEVERAL && contact[pocket] & !UNSURE != OVERSIZE;
     let mut stays = pockets.wider_than(mesh, settings.max_grain_m, undecided);
     if !settings.fill_edge_holes {
-        let at_edge = pockets.any(|t| adjacency.is_at_mesh_edge(t));
+        let at_edge = pockets.holding(adjacency.at_mesh_edge());
         stays.iter_mut().zip(at_edge).for_each(|(stays, at_edge)| *stays |= at_edge);
     }
     for (t, &pocket) in pockets.of.iter().enumerate() {

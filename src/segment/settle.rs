@@ -3,7 +3,7 @@
 use super::Sizes;
 use super::adjacency::Adjacency;
 use super::components::Components;
-use super::state::{Labels, NONE, OVERSIZE, State};
+use super::state::{Labels, NONE, OVERSIZE, State, unknown};
 use crate::geometry::{ExactSum, PlanBox};
 use crate::tile::TileMesh;
 
@@ -33,7 +33,7 @@ pub struct Settled {
     /// A body that is not whole is no reason to look further when a triangle of it outside the core lies lower
     /// than all in it: every core triangle is known, so its lowest triangle cannot be here.
     pub unsettled: Vec<u32>,
-    /// Sides of oversize core triangles where a triangle that is unknown, or was not loaded, may lie.
+    /// Places where an oversize body may go on from the core into what is unknown, or was not loaded.
     pub oversize_open: u64,
 }
 
@@ -84,12 +84,13 @@ pub fn oversize_pieces(mesh: &TileMesh, adjacency: &Adjacency, labels: &Labels) 
     let of_body = |t: usize| labels.label[t] == OVERSIZE;
     let inside = |t: usize| of_body(t) && mesh.in_core[t];
     let outside = |t: usize| of_body(t) && !mesh.in_core[t];
-    let mut found = Oversize { unknown: unknown_in_core(mesh, labels).collect(), ..Oversize::default() };
+    let mut found = Oversize { unknown: unknown(&labels.state), ..Oversize::default() };
+    found.unknown.retain(|&t| mesh.in_core[t as usize]);
     if !(0..labels.label.len()).any(inside) {
         return found;
     }
     let bodies = Components::of(adjacency, of_body);
-    let unknown = |t: usize| labels.state[t] == State::Unknown;
+    let is_unknown = |t: usize| labels.state[t] == State::Unknown;
     found.pieces = vec![OversizePiece::default(); bodies.len()];
     for t in (0..labels.label.len()).filter(|&t| inside(t)) {
         let piece = &mut found.pieces[bodies.of[t] as usize];
@@ -104,11 +105,11 @@ pub fn oversize_pieces(mesh: &TileMesh, adjacency: &Adjacency, labels: &Labels) 
         for &side in sides.iter().filter(|&&s| outside(s as usize)) {
             piece.crossings.push([mesh.triangle_id(t as u32), mesh.triangle_id(side)]);
         }
-        found.open += u64::from(adjacency.is_open(t));
-        found.open += sides.iter().filter(|&&s| unknown(s as usize)).count() as u64;
+        found.open += sides.iter().filter(|&&s| is_unknown(s as usize)).count() as u64;
     }
+    found.open += adjacency.open().iter().filter(|&&t| inside(t as usize)).count() as u64;
     for fork in adjacency.forks() {
-        let doubtful = fork.iter().any(|&t| unknown(t as usize));
+        let doubtful = fork.iter().any(|&t| is_unknown(t as usize));
         for &t in fork.iter().filter(|&&t| inside(t as usize)) {
             found.open += u64::from(doubtful);
             let others = fork.iter().filter(|&&s| outside(s as usize));
@@ -120,11 +121,6 @@ pub fn oversize_pieces(mesh: &TileMesh, adjacency: &Adjacency, labels: &Labels) 
     found
 }
 
-fn unknown_in_core(mesh: &TileMesh, labels: &Labels) -> impl Iterator<Item = u32> {
-    let unknown = |&t: &u32| labels.state[t as usize] == State::Unknown && mesh.in_core[t as usize];
-    (0..labels.state.len() as u32).filter(unknown)
-}
-
 /// Drops small bodies for the last time and sorts out what the core may publish.
 ///
 /// A grain is owned through its lowest triangle.
@@ -132,9 +128,10 @@ pub fn settle(mesh: &TileMesh, adjacency: &Adjacency, sizes: &Sizes, labels: &La
     let state = &labels.state;
     let bodies = Components::of(adjacency, |t| state[t] == State::Kept && labels.label[t] < OVERSIZE);
     let size = bodies.sizes(mesh, sizes);
-    let open = bodies.any(|t| adjacency.is_open(t));
-    let at_mesh_edge = bodies.any(|t| adjacency.is_at_mesh_edge(t));
-    let doubtful = bodies.beside(adjacency, |t| state[t] == State::Unknown);
+    let unknown = unknown(state);
+    let open = bodies.holding(adjacency.open());
+    let at_mesh_edge = bodies.holding(adjacency.at_mesh_edge());
+    let doubtful = bodies.beside(adjacency, &unknown);
     let mut triangles = vec![0usize; bodies.len()];
     for &part in bodies.of.iter().filter(|&&part| part != NONE) {
         triangles[part as usize] += 1;
@@ -149,7 +146,7 @@ pub fn settle(mesh: &TileMesh, adjacency: &Adjacency, sizes: &Sizes, labels: &La
         })
         .collect();
     let mut unsettled = oversize.unknown;
-    unsettled.extend(unknown_in_core(mesh, labels));
+    unsettled.extend(unknown.into_iter().filter(|&t| mesh.in_core[t as usize]));
     for (t, part) in bodies.of.iter().enumerate().filter(|(_, part)| **part != NONE) {
         let part = *part as usize;
         if let Some(grain) = &mut grains[part] {

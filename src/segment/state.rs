@@ -11,6 +11,11 @@ pub enum State {
     Unknown,
 }
 
+/// The triangles of unknown state, ascending.
+pub fn unknown(state: &[State]) -> Vec<u32> {
+    (0..state.len() as u32).filter(|&t| state[t as usize] == State::Unknown).collect()
+}
+
 /// No body. All labels are below 2^31, so that a vertex can carry one and [`UNSURE`] in one number.
 pub const NONE: u32 = UNSURE - 1;
 /// The one label of all oversize bodies. One for all, because two pieces seen in a tile may be joined
