@@ -18,8 +18,8 @@ pub fn fill_holes(mesh: &TileMesh, adjacency: &Adjacency, settings: &SegmentSett
         if let Some(contact) = contact.get_mut(pocket as usize)
             && *contact & !UNSURE != SEVERAL
         {
-            for &v in corners {
-                *contact = merge(*contact, touching[v as usize]);
+            for touching in corners.map(|v| touching[v as usize]).into_iter().filter(|&t| t != NONE) {
+                *contact = merge(*contact, touching);
             }
         }
     }
@@ -69,7 +69,10 @@ fn contacts(mesh: &TileMesh, labels: &Labels) -> Vec<u32> {
             State::Removed => continue,
         };
         for &v in corners {
-            touching[v as usize] = merge(touching[v as usize], adds);
+            let touching = &mut touching[v as usize];
+            if *touching != adds {
+                *touching = merge(*touching, adds);
+            }
         }
     }
     touching

@@ -125,10 +125,9 @@ pub fn oversize_pieces(mesh: &TileMesh, adjacency: &Adjacency, labels: &Labels) 
 ///
 /// A grain is owned through its lowest triangle.
 pub fn settle(mesh: &TileMesh, adjacency: &Adjacency, sizes: &Sizes, labels: &Labels, oversize: Oversize) -> Settled {
-    let state = &labels.state;
-    let bodies = Components::of(adjacency, |t| state[t] == State::Kept && labels.label[t] < OVERSIZE);
+    let bodies = Components::of(adjacency, |t| labels.label[t] < OVERSIZE);
     let size = bodies.sizes(mesh, sizes);
-    let unknown = unknown(state);
+    let unknown = unknown(&labels.state);
     let open = bodies.holding(adjacency.open());
     let at_mesh_edge = bodies.holding(adjacency.at_mesh_edge());
     let doubtful = bodies.beside(adjacency, &unknown);

@@ -4,9 +4,14 @@ use crate::geometry::{DVec3, triangle_area, triangle_centroid};
 use crate::index::{CellBlock, Index};
 use crate::open::Surface;
 
-/// Bytes that one loaded triangle takes at the height of segmentation: counted from the arrays of
-/// [`TileMesh`], its edges, labels and components, with a tenth for growth.
-pub const BYTES_PER_TRIANGLE: u64 = 240;
+/// Bytes that one loaded triangle takes at the height of segmentation, while neighbours are paired.
+///
+/// Counted, for half as many vertices as triangles: positions 12, corners 12, complete 0.5, in_core 1, and the
+/// divergence of the vertices 4; half-edges 24, the ends of their lists 2, neighbours 12; makes 67.5. Ids and
+/// areas, which segmentation does not need, add 40 as they are loaded now (vertex ids 24, for the list of all
+/// corners they were found in; triangle ids 8; areas 8). A tenth for growth comes on top. Later steps take
+/// less: 17 for neighbours, states and labels, and up to 18 more for each triangle that is unknown.
+pub const BYTES_PER_TRIANGLE: u64 = 120;
 
 /// Local numbers of half-edges, three for each triangle, must fit 32 bits.
 const MOST_TRIANGLES: usize = 1 << 30;
