@@ -9,7 +9,7 @@ use gravelometer::geometry::{DVec3, sphericity};
 use gravelometer::index::{Index, Scale};
 use gravelometer::measure::{Wanted, measure};
 use gravelometer::open::MemorySurface;
-use gravelometer::segment::edges::Edges;
+use gravelometer::segment::adjacency::Adjacency;
 use gravelometer::segment::state::State;
 use gravelometer::segment::{Segment, Step, segment};
 use gravelometer::settings::Settings;
@@ -217,9 +217,25 @@ fn a_bed_with_overhangs_is_segmented_as_by_the_authors() {
 }
 
 #[test]
-fn edges_of_a_golden_mesh_hold_every_side_of_every_triangle() {
+fn in_a_golden_mesh_every_triangle_is_beside_its_neighbours_and_they_beside_it() {
     let Some(g) = golden("bed_0.3M") else { return };
     let mesh = whole(&g);
-    let edges = Edges::of(&mesh.triangles, mesh.positions.len());
-    assert_eq!(edges.iter().map(|(_, t)| t.len()).sum::<usize>(), 3 * g.tri_seg.len());
+    let adjacency = Adjacency::of(&mesh);
+    assert_eq!((adjacency.len() as u64, adjacency.forks().count()), (g.tri_seg.len() as u64, 0));
+    assert!(adjacency.open().is_empty());
+    let mut edges = BTreeMap::<[u32; 2], Vec<u32>>::new();
+    for (t, &[a, b, c]) in mesh.triangles.iter().enumerate() {
+        for [v, w] in [[a, b], [b, c], [c, a]] {
+            edges.entry([v.min(w), v.max(w)]).or_default().push(t as u32);
+        }
+    }
+    for (t, &[a, b, c]) in mesh.triangles.iter().enumerate() {
+        let t = t as u32;
+        let sides = adjacency.sides(t as usize);
+        for ([v, w], side) in [[a, b], [b, c], [c, a]].into_iter().zip(sides) {
+            let around = &edges[&[v.min(w), v.max(w)]];
+            assert_eq!(*around, if side == t { vec![t] } else { vec![t.min(side), t.max(side)] });
+        }
+        assert_eq!(adjacency.at_mesh_edge().binary_search(&t).is_ok(), sides.contains(&t));
+    }
 }

@@ -1,13 +1,19 @@
-//! Bodies: the convex components that are left, told apart from sheets, crumbs and bedrock.
+//! Bodies: the convex components that are left, told apart from crumbs and bedrock.
 
 use super::Sizes;
-use super::components::{Components, Part};
-use super::edges::Edges;
-use super::state::{Labels, NONE, OVERSIZE, State};
-use crate::geometry::flatter_than;
+use super::adjacency::Adjacency;
+use super::components::{Components, join_all, root};
+use super::state::{Labels, NONE, OVERSIZE, State, unknown};
 use crate::settings::SegmentSettings;
 use crate::tile::TileMesh;
-use rayon::prelude::*;
+
+/// What becomes of a component.
+#[derive(Clone, Copy)]
+enum Fate {
+    Gone,
+    Unknown,
+    Body(u32),
+}
 
 /// Removes components smaller than the smallest grain, and labels the others by their lowest triangle.
 ///
@@ -15,54 +21,85 @@ use rayon::prelude::*;
 /// enough. Every other component that is not whole is unknown from here on.
 pub fn tell_apart(
     mesh: &TileMesh,
-    edges: &Edges,
+    adjacency: &Adjacency,
     sizes: &Sizes,
     mut state: Vec<State>,
     settings: &SegmentSettings,
 ) -> Labels {
-    let possible = Components::of(mesh, edges, &sizes.of, |t| state[t] != State::Removed, |_| false);
-    let sure = Components::of(mesh, edges, &sizes.of, |t| state[t] == State::Kept, |t| state[t] == State::Unknown);
-    let wide = |part: &Part| settings.max_grain_m > 0.0 && part.bounds.width_m() > settings.max_grain_m;
-    let mut label = vec![NONE; state.len()];
-    for t in 0..state.len() {
-        let Some(most) = possible.part(t) else { continue };
-        // Whatever the truth is, it lies within `most`, and contains `sure.part(t)` where there is one.
-        if !most.open && most.size < sizes.smallest {
-            state[t] = State::Removed;
-            continue;
-        }
-        match sure.part(t) {
-            Some(part) if part.closed() && part.size < sizes.smallest => state[t] = State::Removed,
-            Some(part) if part.size >= sizes.smallest && wide(part) => label[t] = OVERSIZE,
-            Some(part) if part.closed() => label[t] = part.lowest,
-            _ => state[t] = State::Unknown,
-        }
+    // Whatever the truth is, a body contains its kept component, and lies within the possible one.
+    let kept = Components::of(adjacency, |t| state[t] == State::Kept);
+    let size = kept.sizes(mesh, sizes);
+    let open = kept.holding(adjacency.open());
+    let unknown = unknown(&state);
+    let doubtful = kept.beside(adjacency, &unknown);
+    let wide = kept.wider_than(mesh, settings.max_grain_m, |part| size[part] >= sizes.smallest);
+    let fate: Vec<Fate> = (0..kept.len())
+        .map(|part| match (size[part] >= sizes.smallest, !open[part] && !doubtful[part]) {
+            (true, _) if wide[part] => Fate::Body(OVERSIZE),
+            (true, true) => Fate::Body(kept.lowest[part]),
+            (false, true) => Fate::Gone,
+            (_, false) => Fate::Unknown,
+        })
+        .collect();
+    let Possible { node: mut label, too_small } = Possible::of(mesh, adjacency, sizes, &unknown, kept.of, (size, open));
+    for (state, label) in state.iter_mut().zip(&mut label).filter(|(_, node)| **node != NONE) {
+        let node = *label as usize;
+        let fate = if too_small[node] { Fate::Gone } else { *fate.get(node).unwrap_or(&Fate::Unknown) };
+        (*state, *label) = match fate {
+            Fate::Gone => (State::Removed, NONE),
+            Fate::Unknown => (State::Unknown, NONE),
+            Fate::Body(body) => (State::Kept, body),
+        };
     }
     Labels { state, label }
 }
 
-/// Removes bodies whose convex hull is less spherical than a grain may be: sheets and ridges.
-///
-/// Oversize bodies are not tested: nobody sees them whole.
-pub fn drop_flat(mesh: &TileMesh, labels: &mut Labels, min_sphericity: f64) {
-    if min_sphericity <= 0.0 {
-        return;
-    }
-    let mut members: Vec<(u32, u32)> = (0..labels.label.len() as u32)
-        .filter(|&t| labels.label[t as usize] < OVERSIZE)
-        .map(|t| (labels.label[t as usize], t))
-        .collect();
-    members.sort_unstable();
-    let bodies: Vec<&[(u32, u32)]> = members.chunk_by(|a, b| a.0 == b.0).collect();
-    let flat: Vec<bool> = bodies
-        .par_iter()
-        .map(|body| {
-            let triangles: Vec<u32> = body.iter().map(|&(_, t)| t).collect();
-            flatter_than(&mesh.points_of(&triangles), min_sphericity)
-        })
-        .collect();
-    for (_, t) in bodies.iter().zip(&flat).filter(|(_, f)| **f).flat_map(|(b, _)| b.iter()) {
-        labels.state[*t as usize] = State::Removed;
-        labels.label[*t as usize] = NONE;
+/// The most that bodies can be: kept components, joined by the unknown triangles beside them.
+struct Possible {
+    /// Kept component of each triangle; unknown triangles are numbered after these; [`NONE`] for removed ones.
+    node: Vec<u32>,
+    /// Whether a node is smaller than the smallest grain together with all that could belong to it.
+    too_small: Vec<bool>,
+}
+
+impl Possible {
+    /// `size` and `open` are of the kept components, whose numbers `node` holds.
+    fn of(
+        mesh: &TileMesh,
+        adjacency: &Adjacency,
+        sizes: &Sizes,
+        unknown: &[u32],
+        mut node: Vec<u32>,
+        (mut size, mut open): (Vec<u64>, Vec<bool>),
+    ) -> Possible {
+        let kept = size.len();
+        let mut parent: Vec<u32> = (0..(kept + unknown.len()) as u32).collect();
+        for (i, &t) in unknown.iter().enumerate() {
+            node[t as usize] = (kept + i) as u32;
+        }
+        for &t in unknown {
+            for side in adjacency.sides(t as usize).map(|s| node[s as usize]).into_iter().filter(|&s| s != NONE) {
+                join_all(&mut parent, [node[t as usize], side].into_iter());
+            }
+        }
+        for fork in adjacency.forks() {
+            join_all(&mut parent, fork.iter().map(|&t| node[t as usize]).filter(|&i| i != NONE));
+        }
+        // Roots are the lowest of their nodes, so what a node adds goes to one that is summed already.
+        size.resize(parent.len(), 0);
+        open.resize(parent.len(), false);
+        adjacency.open().iter().map(|&t| node[t as usize]).filter(|&i| i != NONE).for_each(|i| open[i as usize] = true);
+        for i in 0..parent.len() {
+            let whole = root(&mut parent, i as u32) as usize;
+            parent[i] = whole as u32;
+            open[whole] |= open[i];
+            if i < kept && whole != i {
+                size[whole] = size[whole].saturating_add(size[i]);
+            } else if i >= kept && size[whole] < sizes.smallest {
+                size[whole] += sizes.of(mesh, unknown[i - kept]);
+            }
+        }
+        let too_small = parent.iter().map(|&whole| !open[whole as usize] && size[whole as usize] < sizes.smallest);
+        Possible { node, too_small: too_small.collect() }
     }
 }

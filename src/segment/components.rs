@@ -1,6 +1,7 @@
 //! Connected components of selected triangles, by shared edges.
 
-use super::edges::Edges;
+use super::Sizes;
+use super::adjacency::Adjacency;
 use super::state::NONE;
 use crate::geometry::PlanBox;
 use crate::tile::TileMesh;
@@ -9,123 +10,110 @@ use crate::tile::TileMesh;
 pub struct Components {
     /// Component of each triangle; [`NONE`] for those not selected.
     pub of: Vec<u32>,
-    /// What is known of each component.
-    pub parts: Vec<Part>,
-}
-
-/// What the steps of the recipe ask of a component.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Part {
-    /// Lowest local triangle.
-    pub lowest: u32,
-    /// Size in the unit of the area rule (see [`super::Sizes`]).
-    pub size: u64,
-    /// Box in plan of its vertices, local metres.
-    pub bounds: PlanBox,
-    /// Whether a triangle beyond the halo may be joined to it.
-    pub open: bool,
-    /// Whether a triangle of unknown state is joined to it.
-    pub doubtful: bool,
-    /// Whether an edge of the mesh bounds it.
-    pub at_mesh_edge: bool,
-}
-
-impl Part {
-    /// Whether the component is whole: exactly what it would be if everything had been loaded.
-    pub fn closed(&self) -> bool {
-        !self.open && !self.doubtful
-    }
+    /// Lowest local triangle of each component.
+    pub lowest: Vec<u32>,
 }
 
 impl Components {
-    /// Components of the triangles for which `selected` holds; `unknown` tells which others might turn
-    /// out to be selected too. `sizes` gives the size of each triangle.
-    pub fn of(
-        mesh: &TileMesh,
-        edges: &Edges,
-        sizes: &[u64],
-        selected: impl Fn(usize) -> bool,
-        unknown: impl Fn(usize) -> bool,
-    ) -> Components {
-        let n = mesh.triangles.len();
-        let mut parent: Vec<u32> = (0..n as u32).collect();
-        for (_, around) in edges.iter() {
-            let mut last = None;
-            for &t in around.iter().filter(|&&t| selected(t as usize)) {
-                if let Some(other) = last.replace(t) {
-                    join(&mut parent, other, t);
-                }
-            }
-        }
-        let mut of = vec![NONE; n];
-        let mut parts: Vec<Part> = Vec::new();
-        for t in (0..n).filter(|&t| selected(t)) {
-            let root = find(&mut parent, t as u32) as usize;
-            if root == t {
-                of[t] = parts.len() as u32;
-                parts.push(Part::starting_at(t as u32));
-            } else {
-                of[t] = of[root];
-            }
-            let part = &mut parts[of[t] as usize];
-            part.size += sizes[t];
-            mesh.triangles[t].iter().for_each(|&v| part.bounds.include(mesh.positions[v as usize]));
-        }
-        let mut components = Components { of, parts };
-        components.look_around(mesh, edges, unknown);
-        components
-    }
-
-    fn look_around(&mut self, mesh: &TileMesh, edges: &Edges, unknown: impl Fn(usize) -> bool) {
-        for (ends, around) in edges.iter() {
-            // Around a complete vertex everything is loaded, so an edge can only lack a triangle where
-            // both its ends are incomplete.
-            let open = ends.iter().all(|&v| !mesh.complete[v as usize]);
-            let doubtful = around.iter().any(|&t| unknown(t as usize));
-            let mesh_edge = !open && ends[0] != ends[1] && lone(mesh, around);
-            if open || doubtful || mesh_edge {
-                for &t in around {
-                    if let Some(part) = self.parts.get_mut(self.of[t as usize] as usize) {
-                        part.open |= open;
-                        part.doubtful |= doubtful;
-                        part.at_mesh_edge |= mesh_edge;
+    /// Components of the triangles for which `selected` holds.
+    pub fn of(adjacency: &Adjacency, selected: impl Fn(usize) -> bool) -> Components {
+        // First the way to a lower triangle of the same component, or to itself; `NONE` if not selected.
+        let mut of = vec![NONE; adjacency.len()];
+        for t in (0..of.len()).filter(|&t| selected(t)) {
+            let here = t as u32;
+            let mut low = here;
+            for side in adjacency.sides(t) {
+                if side < here && of[side as usize] != NONE {
+                    let other = root(&mut of, side);
+                    if low != here && low != other {
+                        of[low.max(other) as usize] = low.min(other);
                     }
+                    low = low.min(other);
                 }
             }
+            of[t] = low;
+        }
+        for fork in adjacency.forks() {
+            join_all(&mut of, fork.iter().copied().filter(|&t| selected(t as usize)));
+        }
+        let mut lowest = Vec::new();
+        for t in 0..of.len() {
+            if of[t] == t as u32 {
+                of[t] = lowest.len() as u32;
+                lowest.push(t as u32);
+            } else if of[t] != NONE {
+                // The way leads downward, where numbers of components stand already.
+                of[t] = of[of[t] as usize];
+            }
+        }
+        Components { of, lowest }
+    }
+
+    /// How many components there are.
+    pub fn len(&self) -> usize {
+        self.lowest.len()
+    }
+
+    /// Size of each component in the unit of [`Sizes`]: exact where it is below the smallest grain, and not
+    /// below it elsewhere.
+    pub fn sizes(&self, mesh: &TileMesh, sizes: &Sizes) -> Vec<u64> {
+        let mut size = vec![0; self.len()];
+        for (t, &part) in self.of.iter().enumerate() {
+            if let Some(size) = size.get_mut(part as usize)
+                && *size < sizes.smallest
+            {
+                *size += sizes.of(mesh, t as u32);
+            }
+        }
+        size
+    }
+
+    /// Which components hold one of these triangles.
+    pub fn holding(&self, triangles: &[u32]) -> Vec<bool> {
+        let mut holding = vec![false; self.len()];
+        for &t in triangles {
+            self.mark(t, &mut holding);
+        }
+        holding
+    }
+
+    /// Which components lie side by side with one of these triangles, which are of none; ascending.
+    pub fn beside(&self, adjacency: &Adjacency, triangles: &[u32]) -> Vec<bool> {
+        let mut beside = vec![false; self.len()];
+        for &t in triangles {
+            adjacency.sides(t as usize).into_iter().for_each(|t| self.mark(t, &mut beside));
+        }
+        for fork in adjacency.forks().filter(|f| f.iter().any(|t| triangles.binary_search(t).is_ok())) {
+            fork.iter().for_each(|&t| self.mark(t, &mut beside));
+        }
+        beside
+    }
+
+    fn mark(&self, triangle: u32, marks: &mut [bool]) {
+        if let Some(mark) = marks.get_mut(self.of[triangle as usize] as usize) {
+            *mark = true;
         }
     }
 
-    /// The component of a triangle, if it is in one.
-    pub fn part(&self, triangle: usize) -> Option<&Part> {
-        self.parts.get(self.of[triangle] as usize)
-    }
-}
-
-impl Part {
-    fn starting_at(lowest: u32) -> Part {
-        Part { lowest, size: 0, bounds: PlanBox::EMPTY, open: false, doubtful: false, at_mesh_edge: false }
-    }
-}
-
-/// Whether only one triangle lies at an edge. Faces that name a vertex twice, and copies of a face, do not
-/// count.
-fn lone(mesh: &TileMesh, around: &[u32]) -> bool {
-    let mut only = None;
-    for &t in around {
-        let mut corners = mesh.triangles[t as usize];
-        corners.sort_unstable();
-        if corners[0] == corners[1] || corners[1] == corners[2] {
-            continue;
+    /// Which components, of those asked for, are wider in plan than so many metres; none is for 0.
+    pub fn wider_than(&self, mesh: &TileMesh, width_m: f64, asked: impl Fn(usize) -> bool) -> Vec<bool> {
+        if width_m == 0.0 {
+            return vec![false; self.len()];
         }
-        if *only.get_or_insert(corners) != corners {
-            return false;
+        let mut bounds = vec![PlanBox::EMPTY; self.len()];
+        for (t, &part) in self.of.iter().enumerate() {
+            if let Some(bounds) = bounds.get_mut(part as usize)
+                && asked(part as usize)
+            {
+                mesh.corners(t as u32).into_iter().for_each(|p| bounds.include(p));
+            }
         }
+        bounds.iter().map(|b| b.width_m() > width_m).collect()
     }
-    only.is_some()
 }
 
-/// The root is the lowest member, always.
-fn find(parent: &mut [u32], mut t: u32) -> u32 {
+/// The lowest triangle that the way of a triangle leads to. The way is shortened.
+pub(super) fn root(parent: &mut [u32], mut t: u32) -> u32 {
     while parent[t as usize] != t {
         let up = parent[parent[t as usize] as usize];
         parent[t as usize] = up;
@@ -134,7 +122,13 @@ fn find(parent: &mut [u32], mut t: u32) -> u32 {
     t
 }
 
-fn join(parent: &mut [u32], a: u32, b: u32) {
-    let (a, b) = (find(parent, a), find(parent, b));
-    parent[a.max(b) as usize] = a.min(b);
+/// Joins all of these.
+pub(super) fn join_all(parent: &mut [u32], members: impl Iterator<Item = u32>) {
+    let mut last = None;
+    for t in members {
+        if let Some(other) = last.replace(t) {
+            let (a, b) = (root(parent, other), root(parent, t));
+            parent[a.max(b) as usize] = a.min(b);
+        }
+    }
 }

@@ -1,9 +1,8 @@
 //! Concave pockets inside a single grain are filled.
 
-use super::Sizes;
+use super::adjacency::Adjacency;
 use super::components::Components;
-use super::edges::Edges;
-use super::state::{Labels, NONE, OVERSIZE, State};
+use super::state::{Labels, NONE, OVERSIZE, State, UNSURE};
 use crate::settings::SegmentSettings;
 use crate::tile::TileMesh;
 
@@ -11,33 +10,37 @@ use crate::tile::TileMesh;
 ///
 /// A pocket wider than the widest grain is open ground; so is, unless `fill_edge_holes`, one that an
 /// edge of the mesh bounds, since nobody knows what it touches beyond; so is one in an oversize body.
-pub fn fill_holes(mesh: &TileMesh, edges: &Edges, sizes: &Sizes, settings: &SegmentSettings, labels: &mut Labels) {
-    let state = &labels.state;
-    let pockets =
-        Components::of(mesh, edges, &sizes.of, |t| state[t] == State::Removed, |t| state[t] == State::Unknown);
-    let touching = Contacts::of(mesh, labels);
-    let mut contact = vec![(NONE, true); pockets.parts.len()];
-    for (t, corners) in mesh.triangles.iter().enumerate() {
-        if let Some((only, sure)) = contact.get_mut(pockets.of[t] as usize) {
-            for &v in corners {
-                *only = merge(*only, touching.only[v as usize]);
-                *sure &= touching.sure[v as usize];
+pub fn fill_holes(mesh: &TileMesh, adjacency: &Adjacency, settings: &SegmentSettings, labels: &mut Labels) {
+    let pockets = Components::of(adjacency, |t| labels.state[t] == State::Removed);
+    let touching = contacts(mesh, labels);
+    let mut contact = vec![NONE; pockets.len()];
+    for (corners, &pocket) in mesh.triangles.iter().zip(&pockets.of) {
+        if let Some(contact) = contact.get_mut(pocket as usize)
+            && *contact & !UNSURE != SEVERAL
+        {
+            for touching in corners.map(|v| touching[v as usize]).into_iter().filter(|&t| t != NONE) {
+                *contact = merge(*contact, touching);
             }
         }
     }
-    for t in 0..mesh.triangles.len() {
-        let Some(part) = pockets.part(t) else { continue };
-        let (only, sure) = contact[pockets.of[t] as usize];
-        let wide = settings.max_grain_m > 0.0 && part.bounds.width_m() > settings.max_grain_m;
-        let at_edge = part.at_mesh_edge && !settings.fill_edge_holes;
-        if only == SEVERAL || only == OVERSIZE || wide || at_edge {
+    drop(touching);
+    let undecided = |pocket: usize| contact[pocket] & !UNSURE != SEVERAL && contact[pocket] & !UNSURE != OVERSIZE;
+    let mut stays = pockets.wider_than(mesh, settings.max_grain_m, undecided);
+    if !settings.fill_edge_holes {
+        let at_edge = pockets.holding(adjacency.at_mesh_edge());
+        stays.iter_mut().zip(at_edge).for_each(|(stays, at_edge)| *stays |= at_edge);
+    }
+    for (t, &pocket) in pockets.of.iter().enumerate() {
+        let pocket = pocket as usize;
+        if pocket >= stays.len() || stays[pocket] || !undecided(pocket) {
             continue;
         }
-        if !sure || !part.closed() {
+        // A pocket that the cut has opened, or beside something unknown, has vertices that are not sure.
+        if contact[pocket] & UNSURE != 0 {
             labels.state[t] = State::Unknown;
-        } else if only < SEVERAL {
+        } else if contact[pocket] != NONE {
             labels.state[t] = State::Kept;
-            labels.label[t] = only;
+            labels.label[t] = contact[pocket];
         }
     }
 }
@@ -45,32 +48,32 @@ pub fn fill_holes(mesh: &TileMesh, edges: &Edges, sizes: &Sizes, settings: &Segm
 /// More than one body; below [`OVERSIZE`] and [`NONE`], above every triangle.
 const SEVERAL: u32 = OVERSIZE - 1;
 
+/// The only body of both, or [`SEVERAL`]; [`UNSURE`] if either is.
 fn merge(a: u32, b: u32) -> u32 {
-    match (a, b) {
+    let unsure = (a | b) & UNSURE;
+    let only = match (a & !UNSURE, b & !UNSURE) {
         (NONE, other) | (other, NONE) => other,
         (a, b) if a == b => a,
         _ => SEVERAL,
-    }
+    };
+    only | unsure
 }
 
-/// The only body that touches each vertex ([`NONE`], or [`SEVERAL`]), and whether that is certain.
-struct Contacts {
-    only: Vec<u32>,
-    sure: Vec<bool>,
-}
-
-impl Contacts {
-    fn of(mesh: &TileMesh, labels: &Labels) -> Contacts {
-        let mut contacts = Contacts { only: vec![NONE; mesh.positions.len()], sure: mesh.complete.clone() };
-        for (t, corners) in mesh.triangles.iter().enumerate() {
-            for &v in corners {
-                match labels.state[t] {
-                    State::Kept => contacts.only[v as usize] = merge(contacts.only[v as usize], labels.label[t]),
-                    State::Unknown => contacts.sure[v as usize] = false,
-                    State::Removed => {}
-                }
+/// The only body that touches each vertex ([`NONE`], or [`SEVERAL`]), [`UNSURE`] if that is not certain.
+fn contacts(mesh: &TileMesh, labels: &Labels) -> Vec<u32> {
+    let mut touching: Vec<u32> = mesh.complete.iter().map(|&c| if c { NONE } else { NONE | UNSURE }).collect();
+    for ((corners, state), &label) in mesh.triangles.iter().zip(&labels.state).zip(&labels.label) {
+        let adds = match state {
+            State::Kept => label,
+            State::Unknown => NONE | UNSURE,
+            State::Removed => continue,
+        };
+        for &v in corners {
+            let touching = &mut touching[v as usize];
+            if *touching != adds {
+                *touching = merge(*touching, adds);
             }
         }
-        contacts
     }
+    touching
 }

@@ -9,7 +9,7 @@
 //! | give back small concave dents | [`concave`] | a concave component |
 //! | erode | [`morphology`] | one ring of vertices each |
 //! | drop small bodies, set oversize ones apart | [`bodies`] | a body, at most `max_grain_m` |
-//! | drop flat bodies | [`bodies`] | a body |
+//! | drop flat bodies | [`flat`] | a body |
 //! | dilate | [`morphology`] | one ring of vertices each |
 //! | fill pockets inside one body | [`holes`] | a pocket, at most `max_grain_m` |
 //! | drop small bodies again | [`settle`] | a body |
@@ -19,10 +19,11 @@
 //! triangles, nor anything joined to it, is unknown is *settled*: exactly the grain of the untiled run.
 //! When something that touches the core is still unknown, the tile is worked again with a wider halo.
 
+pub mod adjacency;
 pub mod bodies;
 pub mod components;
 pub mod concave;
-pub mod edges;
+pub mod flat;
 pub mod holes;
 pub mod morphology;
 pub mod settle;
@@ -33,13 +34,13 @@ pub use settle::{OversizePiece, Segment, Settled};
 use crate::index::Scale;
 use crate::settings::{AreaRule, SegmentSettings};
 use crate::tile::TileMesh;
-use edges::Edges;
-use state::{Labels, NONE, State};
+use adjacency::Adjacency;
+use state::{NONE, State};
 
-/// The size of every triangle, in a unit that adds up exactly, and the smallest grain in that unit.
+/// The size of a triangle, in a unit that adds up exactly, and the smallest grain in that unit.
 pub struct Sizes {
-    /// Size of each triangle.
-    pub of: Vec<u64>,
+    /// The unit, m²; none if triangles are counted.
+    unit_m2: Option<f64>,
     /// Components below this size are no grains, and no gaps between grains.
     pub smallest: u64,
 }
@@ -48,19 +49,21 @@ impl Sizes {
     /// Parts of a mean triangle's area that are counted by [`AreaRule::Area`].
     const PARTS: f64 = 1_048_576.0;
 
-    /// Sizes of a tile's triangles by the rule of the settings.
-    pub fn new(mesh: &TileMesh, scale: &Scale, settings: &SegmentSettings) -> Sizes {
+    /// Sizes by the rule of the settings.
+    pub fn new(scale: &Scale, settings: &SegmentSettings) -> Sizes {
         let triangles = smallest_grain_area_m2(scale, settings) / scale.mean_triangle_area_m2;
         match settings.area_rule {
-            AreaRule::TriangleCount => Sizes { of: vec![1; mesh.triangles.len()], smallest: triangles as u64 },
-            AreaRule::Area => {
-                let unit = scale.mean_triangle_area_m2 / Self::PARTS;
-                Sizes {
-                    of: (0..mesh.triangles.len() as u32).map(|t| (mesh.area_m2(t) / unit).round() as u64).collect(),
-                    smallest: (triangles * Self::PARTS).round() as u64,
-                }
-            }
+            AreaRule::TriangleCount => Sizes { unit_m2: None, smallest: triangles as u64 },
+            AreaRule::Area => Sizes {
+                unit_m2: Some(scale.mean_triangle_area_m2 / Self::PARTS),
+                smallest: (triangles * Self::PARTS).round() as u64,
+            },
         }
+    }
+
+    /// Size of one triangle.
+    pub fn of(&self, mesh: &TileMesh, triangle: u32) -> u64 {
+        self.unit_m2.map_or(1, |unit_m2| (mesh.area_m2(triangle) / unit_m2).round() as u64)
     }
 }
 
@@ -99,38 +102,34 @@ pub fn segment(
     settings: &SegmentSettings,
     watch: &mut dyn FnMut(Step, &[State]),
 ) -> Settled {
-    let edges = Edges::of(&mesh.triangles, mesh.positions.len());
-    let sizes = Sizes::new(mesh, scale, settings);
+    let adjacency = Adjacency::of(mesh);
+    let sizes = Sizes::new(scale, settings);
+    let tall = concave::too_tall(mesh, settings);
     let mut state = concave::remove_concave(mesh, divergence, scale.mean_edge_m, settings);
+    tall.iter().for_each(|&t| state[t as usize] = State::Removed);
     watch(Step::Concave, &state);
-    concave::give_back_dents(mesh, &edges, &sizes, &mut state);
+    concave::give_back_dents(mesh, &adjacency, &sizes, &mut state);
     watch(Step::Dents, &state);
     for _ in 0..settings.erosion_iterations {
         morphology::erode(mesh, &mut state);
     }
     watch(Step::Erosion, &state);
-    let mut labels = bodies::tell_apart(mesh, &edges, &sizes, state, settings);
+    let mut labels = bodies::tell_apart(mesh, &adjacency, &sizes, state, settings);
     watch(Step::SmallBodies, &labels.state);
-    bodies::drop_flat(mesh, &mut labels, settings.min_sphericity);
+    flat::drop_flat(mesh, &mut labels, settings.min_sphericity);
     watch(Step::FlatBodies, &labels.state);
-    let oversize = settle::oversize_pieces(mesh, &edges, &labels);
+    let oversize = settle::oversize_pieces(mesh, &adjacency, &labels);
     for ring in 1..=settings.dilation_iterations {
         morphology::dilate(mesh, &mut labels);
-        remove_tall(mesh, &mut labels, settings);
+        for &t in &tall {
+            labels.state[t as usize] = State::Removed;
+            labels.label[t as usize] = NONE;
+        }
         watch(Step::Dilation(ring), &labels.state);
     }
     if settings.fill_holes {
-        holes::fill_holes(mesh, &edges, &sizes, settings, &mut labels);
+        holes::fill_holes(mesh, &adjacency, settings, &mut labels);
     }
     watch(Step::Holes, &labels.state);
-    settle::settle(mesh, &edges, &sizes, &labels, oversize)
-}
-
-fn remove_tall(mesh: &TileMesh, labels: &mut Labels, settings: &SegmentSettings) {
-    if settings.max_triangle_height_m > 0.0 {
-        for t in (0..mesh.triangles.len()).filter(|&t| concave::too_tall(mesh, t, settings)) {
-            labels.state[t] = State::Removed;
-            labels.label[t] = NONE;
-        }
-    }
+    settle::settle(mesh, &adjacency, &sizes, &labels, oversize)
 }

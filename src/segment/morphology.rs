@@ -5,25 +5,31 @@
 //! in file order and lets the first win; here the lowest triangle proposes, which is the same nearly
 //! everywhere).
 
-use super::state::{Labels, NONE, State};
+use super::state::{Labels, NONE, State, UNSURE};
 use crate::tile::TileMesh;
+
+/// A removed triangle lies at the vertex.
+const AT_REMOVED: u8 = 1;
+/// An unknown triangle lies at the vertex, or one that is not loaded may.
+const DOUBTFUL: u8 = 2;
 
 /// Takes one ring off: a triangle goes when one of its vertices also belongs to a removed triangle. The
 /// edge of the mesh is not eroded.
 pub fn erode(mesh: &TileMesh, state: &mut [State]) {
-    let n = mesh.positions.len();
-    let mut removed = vec![false; n];
-    let mut doubtful: Vec<bool> = mesh.complete.iter().map(|&c| !c).collect();
+    let mut seen: Vec<u8> = mesh.complete.iter().map(|&c| if c { 0 } else { DOUBTFUL }).collect();
     for (corners, s) in mesh.triangles.iter().zip(&*state) {
-        for &v in corners {
-            removed[v as usize] |= *s == State::Removed;
-            doubtful[v as usize] |= *s == State::Unknown;
-        }
+        let mark = match s {
+            State::Kept => continue,
+            State::Removed => AT_REMOVED,
+            State::Unknown => DOUBTFUL,
+        };
+        corners.iter().for_each(|&v| seen[v as usize] |= mark);
     }
-    for (corners, s) in mesh.triangles.iter().zip(state) {
-        if corners.iter().any(|&v| removed[v as usize]) {
+    for (corners, s) in mesh.triangles.iter().zip(state).filter(|(_, s)| **s != State::Removed) {
+        let seen = corners.iter().fold(0, |all, &v| all | seen[v as usize]);
+        if seen & AT_REMOVED != 0 {
             *s = State::Removed;
-        } else if *s == State::Kept && corners.iter().any(|&v| doubtful[v as usize]) {
+        } else if seen & DOUBTFUL != 0 {
             *s = State::Unknown;
         }
     }
@@ -35,88 +41,71 @@ pub fn erode(mesh: &TileMesh, state: &mut [State]) {
 /// proposed by the lowest triangle that touches exactly one body there. A triangle joins when its three
 /// vertices then agree; one whose vertices agreed before (a pocket inside a body, or open ground) stays.
 pub fn dilate(mesh: &TileMesh, labels: &mut Labels) {
-    let before = VertexLabels::carried(mesh, labels);
-    let after = before.proposed(mesh);
-    for (t, corners) in mesh.triangles.iter().enumerate() {
-        if labels.state[t] != State::Removed {
+    let before = carried(mesh, labels);
+    let (after, front) = proposed(mesh, labels, &before);
+    for &t in &front {
+        let corners = mesh.triangles[t as usize];
+        let was = corners.map(|v| before[v as usize]);
+        if between_two_bodies(was) {
             continue;
         }
-        let was = corners.map(|v| before.label[v as usize]);
-        let sure = corners.map(|v| before.sure[v as usize]);
-        let all_sure = sure == [true; 3];
-        if all_sure && was[0] == was[1] && was[1] == was[2] {
-            continue;
-        }
-        if between_two_bodies(was, sure) {
-            continue;
-        }
-        let now = corners.map(|v| after.label[v as usize]);
-        if all_sure && corners.iter().all(|&v| after.sure[v as usize]) {
-            if now[0] == now[1] && now[1] == now[2] && now[0] != NONE {
-                labels.state[t] = State::Kept;
-                labels.label[t] = now[0];
-            }
-        } else {
-            labels.state[t] = State::Unknown;
+        let now = corners.map(|v| after[v as usize]);
+        // What proposals for its vertices hang on includes its vertices themselves.
+        if (now[0] | now[1] | now[2]) & UNSURE != 0 {
+            labels.state[t as usize] = State::Unknown;
+        } else if now[0] == now[1] && now[1] == now[2] && now[0] != NONE {
+            labels.state[t as usize] = State::Kept;
+            labels.label[t as usize] = now[0];
         }
     }
 }
 
-fn between_two_bodies(label: [u32; 3], sure: [bool; 3]) -> bool {
+fn between_two_bodies(label: [u32; 3]) -> bool {
     (0..3).any(|i| {
-        let j = (i + 1) % 3;
-        sure[i] && sure[j] && label[i] != NONE && label[j] != NONE && label[i] != label[j]
+        let (a, b) = (label[i], label[(i + 1) % 3]);
+        a != b && a < NONE && b < NONE
     })
 }
 
-/// The body that each vertex carries, and whether that is certain.
-struct VertexLabels {
-    label: Vec<u32>,
-    sure: Vec<bool>,
+/// The body that each vertex carries, [`UNSURE`] if that is not certain.
+fn carried(mesh: &TileMesh, labels: &Labels) -> Vec<u32> {
+    let mut carried: Vec<u32> = mesh.complete.iter().map(|&c| if c { NONE } else { NONE | UNSURE }).collect();
+    for ((corners, state), &label) in mesh.triangles.iter().zip(&labels.state).zip(&labels.label) {
+        match state {
+            State::Removed => {}
+            State::Kept => corners.iter().map(|&v| v as usize).for_each(|v| carried[v] = carried[v] & UNSURE | label),
+            State::Unknown => corners.iter().for_each(|&v| carried[v as usize] |= UNSURE),
+        }
+    }
+    carried
 }
 
-impl VertexLabels {
-    fn carried(mesh: &TileMesh, labels: &Labels) -> VertexLabels {
-        let mut of = VertexLabels { label: vec![NONE; mesh.positions.len()], sure: mesh.complete.clone() };
-        for (t, corners) in mesh.triangles.iter().enumerate() {
-            for &v in corners {
-                match labels.state[t] {
-                    State::Kept => of.label[v as usize] = labels.label[t],
-                    State::Unknown => of.sure[v as usize] = false,
-                    State::Removed => {}
-                }
-            }
+/// The body that each vertex carries or is given, [`UNSURE`] if that is not certain; and the removed triangles
+/// whose vertices do not agree before.
+fn proposed(mesh: &TileMesh, labels: &Labels, before: &[u32]) -> (Vec<u32>, Vec<u32>) {
+    let mut after = before.to_vec();
+    let mut front = Vec::new();
+    for (t, corners) in mesh.triangles.iter().enumerate() {
+        let was = corners.map(|v| before[v as usize]);
+        let unsure = (was[0] | was[1] | was[2]) & UNSURE;
+        if unsure == 0 && was[0] == was[1] && was[1] == was[2] {
+            continue;
         }
-        of
-    }
-
-    fn proposed(&self, mesh: &TileMesh) -> VertexLabels {
-        let mut after = VertexLabels { label: self.label.clone(), sure: mesh.complete.clone() };
-        for corners in &mesh.triangles {
-            let label = corners.map(|v| self.label[v as usize]);
-            let sure = corners.iter().all(|&v| self.sure[v as usize]);
-            let proposal = only_body(label);
-            for &v in corners {
-                let v = v as usize;
-                if self.label[v] == NONE && after.label[v] == NONE {
-                    after.label[v] = proposal;
-                }
-                after.sure[v] &= sure;
-            }
+        if labels.state[t] == State::Removed {
+            front.push(t as u32);
         }
-        after
+        let proposal = only_body(was.map(|l| l & !UNSURE));
+        for &v in corners {
+            let label = &mut after[v as usize];
+            let free = *label & !UNSURE == NONE;
+            *label = if free { proposal | *label & UNSURE } else { *label } | unsure;
+        }
     }
+    (after, front)
 }
 
 /// The one body among three labels; [`NONE`] where there is none or more than one.
 fn only_body(label: [u32; 3]) -> u32 {
-    label
-        .into_iter()
-        .filter(|&l| l != NONE)
-        .fold(None, |one, l| match one {
-            None => Some(l),
-            Some(other) if other == l => Some(l),
-            Some(_) => Some(NONE),
-        })
-        .unwrap_or(NONE)
+    let one = label[0].min(label[1]).min(label[2]);
+    if label.iter().all(|&l| l == one || l == NONE) { one } else { NONE }
 }

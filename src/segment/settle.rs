@@ -1,22 +1,37 @@
-//! Settling: which grains a tile may publish, and whether it must look further.
+//! Settling: which grains a tile may publish, and where it must look further.
 
 use super::Sizes;
+use super::adjacency::Adjacency;
 use super::components::Components;
-use super::edges::Edges;
-use super::state::{Labels, NONE, OVERSIZE, State};
+use super::state::{Labels, NONE, OVERSIZE, State, unknown};
 use crate::geometry::{ExactSum, PlanBox};
 use crate::tile::TileMesh;
 use serde::{Deserialize, Serialize};
 
 /// What a tile found.
+///
+/// **What may be published.** Every grain here is one of the untiled run, whole. A grain of the untiled run
+/// whose lowest triangle lies in the core is either here, or its lowest triangle is in `unsettled`, never both.
+/// So the rest can be sought with a wider halo around the unsettled triangles alone, if only grains are taken
+/// whose lowest triangle is one of them: none is lost, none comes twice. Proof: let t be the lowest triangle
+/// of a grain, in the core. What is known is true, so t is unknown at the end, and unsettled; or it is kept, and
+/// what is seen of its body is a part of the grain, whose lowest triangle is t again. If that part is closed,
+/// it is the grain, and published; else all its core triangles are unsettled, t among them. A published
+/// triangle is not unsettled: no step turns an unknown triangle into a kept one.
+///
+/// Likewise every core triangle of an oversize body is in one of the pieces here, or in `unsettled`.
 #[derive(Debug, Clone, Default)]
 pub struct Settled {
-    /// The grains that the tile's core owns, by ascending lowest triangle.
+    /// The grains that the tile's core owns and that are certain, by ascending lowest triangle.
     pub grains: Vec<Segment>,
     /// Pieces of oversize bodies inside the core.
     pub oversize: Vec<OversizePiece>,
-    /// Core triangles that are still unknown, or belong to a grain that is, and that this tile may own.
-    /// The result is the untiled one only when this is 0.
+    /// Core triangles whose fate this tile does not know: local numbers, ascending, each once. They were
+    /// unknown when bodies were told apart, or are at the end, or belong to a body that is not whole and
+    /// whose lowest triangle lies in the core.
+    ///
+    /// A body that is not whole is no reason to look further when a triangle of it outside the core lies lower
+    /// than all in it: every core triangle is known, so its lowest triangle cannot be here.
     pub unsettled: Vec<u32>,
 }
 
@@ -40,22 +55,37 @@ pub struct OversizePiece {
     pub area_m2: ExactSum,
     /// Their box in plan, local metres.
     pub bounds: Option<PlanBox>,
-    /// Global triangle ids on both sides of every edge where the body leaves the core: inside, outside.
+    /// The edges, each by the survey's numbers of its two vertices, the lower first, beyond which the body may go
+    /// on outside the core. Pieces that name the same edge are parts of one body.
     pub crossings: Vec<[u64; 2]>,
 }
 
-/// Oversize bodies as they stand before dilation, and how many core triangles leave open where one ends.
-pub fn oversize_pieces(mesh: &TileMesh, edges: &Edges, labels: &Labels) -> (Vec<OversizePiece>, u64) {
+/// Oversize bodies as they stand before dilation.
+#[derive(Debug, Clone, Default)]
+pub struct Oversize {
+    /// Their pieces in the core, by ascending lowest triangle of the body.
+    pub pieces: Vec<OversizePiece>,
+    /// Core triangles that may be part of a body. A later step may remove such a triangle for sure.
+    pub unknown: Vec<u32>,
+}
+
+/// Gathers the pieces of oversize bodies that lie in the core.
+pub fn oversize_pieces(mesh: &TileMesh, adjacency: &Adjacency, labels: &Labels) -> Oversize {
     let of_body = |t: usize| labels.label[t] == OVERSIZE;
-    // A later step may remove an unknown triangle for sure, but it may be part of a body here.
-    let mut unsettled = unknown_in_core(mesh, labels);
-    if !(0..labels.label.len()).any(of_body) {
-        return (Vec::new(), unsettled);
+    let inside = |t: usize| of_body(t) && mesh.in_core[t];
+    let outside = |t: usize| of_body(t) && !mesh.in_core[t];
+    let mut found = Oversize { unknown: unknown(&labels.state), ..Oversize::default() };
+    found.unknown.retain(|&t| mesh.in_core[t as usize]);
+    if !(0..labels.label.len()).any(inside) {
+        return found;
     }
-    let bodies = Components::of(mesh, edges, &vec![1; labels.label.len()], of_body, |_| false);
-    let mut pieces = vec![OversizePiece::default(); bodies.parts.len()];
-    for t in (0..labels.label.len()).filter(|&t| of_body(t) && mesh.in_core[t]) {
-        let piece = &mut pieces[bodies.of[t] as usize];
+    let bodies = Components::of(adjacency, of_body);
+    let unknown_or_outside = |t: usize| labels.state[t] == State::Unknown || outside(t);
+    let mut forked: Vec<u32> = adjacency.forks().flatten().copied().collect();
+    forked.sort_unstable();
+    found.pieces = vec![OversizePiece::default(); bodies.len()];
+    for t in (0..labels.label.len()).filter(|&t| inside(t)) {
+        let piece = &mut found.pieces[bodies.of[t] as usize];
         if piece.triangles == 0 {
             piece.anchor = mesh.triangle_id(t as u32);
         }
@@ -63,78 +93,55 @@ pub fn oversize_pieces(mesh: &TileMesh, edges: &Edges, labels: &Labels) -> (Vec<
         piece.area_m2.add(mesh.area_m2(t as u32));
         let bounds = piece.bounds.get_or_insert(PlanBox::EMPTY);
         mesh.corners(t as u32).into_iter().for_each(|c| bounds.include(c));
-    }
-    for (ends, around) in edges.iter() {
-        let open = ends.iter().all(|&v| !mesh.complete[v as usize]);
-        for &inside in around.iter().filter(|&&t| of_body(t as usize) && mesh.in_core[t as usize]) {
-            let unknown = |&t: &u32| labels.state[t as usize] == State::Unknown;
-            unsettled += u64::from(open || around.iter().any(unknown));
-            for &outside in around.iter().filter(|&&t| of_body(t as usize) && !mesh.in_core[t as usize]) {
-                pieces[bodies.of[inside as usize] as usize]
-                    .crossings
-                    .push([mesh.triangle_id(inside), mesh.triangle_id(outside)]);
+        let corners = mesh.triangles[t];
+        let forked = forked.binary_search(&(t as u32)).is_ok();
+        for (i, &side) in adjacency.sides(t).iter().enumerate() {
+            let ends = [corners[i], corners[(i + 1) % 3]];
+            let cut_off = ends.iter().all(|&v| !mesh.complete[v as usize]);
+            if forked || cut_off || unknown_or_outside(side as usize) {
+                let [a, b] = ends.map(|v| mesh.vertex_id(v));
+                piece.crossings.push([a.min(b), a.max(b)]);
             }
         }
     }
-    pieces.retain(|p| p.triangles > 0);
-    (pieces, unsettled)
-}
-
-fn unknown_list(mesh: &TileMesh, labels: &Labels) -> Vec<u32> {
-    (0..labels.state.len() as u32)
-        .filter(|&t| mesh.in_core[t as usize] && labels.state[t as usize] == State::Unknown)
-        .collect()
-}
-fn unknown_in_core(mesh: &TileMesh, labels: &Labels) -> u64 {
-    let unknown = |t: &usize| mesh.in_core[*t] && labels.state[*t] == State::Unknown;
-    (0..labels.state.len()).filter(unknown).count() as u64
+    found.pieces.retain(|p| p.triangles > 0);
+    found
 }
 
 /// Drops small bodies for the last time and sorts out what the core may publish.
 ///
-/// A grain is owned through its lowest triangle. A body that is not whole is no reason to look further
-/// when a triangle of it outside the core lies lower than all in it: every core triangle is known, so its
-/// lowest triangle cannot be here.
-pub fn settle(
-    mesh: &TileMesh,
-    edges: &Edges,
-    sizes: &Sizes,
-    labels: &Labels,
-    (oversize, open_oversize): (Vec<OversizePiece>, u64),
-) -> Settled {
-    let state = &labels.state;
-    let bodies = Components::of(
-        mesh,
-        edges,
-        &sizes.of,
-        |t| state[t] == State::Kept && labels.label[t] < OVERSIZE,
-        |t| state[t] == State::Unknown,
-    );
-    assert!(open_oversize == 0);
-    let unsettled = unknown_list(mesh, labels);
-    let mut settled = Settled { oversize, unsettled, ..Settled::default() };
-    let mut grain_of = vec![NONE; bodies.parts.len()];
-    for (part, grain) in bodies.parts.iter().zip(&mut grain_of) {
-        if !mesh.in_core[part.lowest as usize] {
-            continue;
-        }
-        if !part.closed() {
-            let lowest = part.lowest;
-            let id = bodies.of[lowest as usize];
-            settled
-                .unsettled
-                .extend((0..state.len() as u32).filter(|&t| bodies.of[t as usize] == id && mesh.in_core[t as usize]));
-        } else if part.size >= sizes.smallest {
-            *grain = settled.grains.len() as u32;
-            settled.grains.push(Segment { triangles: Vec::new(), at_mesh_edge: part.at_mesh_edge });
+/// A grain is owned through its lowest triangle.
+pub fn settle(mesh: &TileMesh, adjacency: &Adjacency, sizes: &Sizes, labels: &Labels, oversize: Oversize) -> Settled {
+    let bodies = Components::of(adjacency, |t| labels.label[t] < OVERSIZE);
+    let size = bodies.sizes(mesh, sizes);
+    let unknown = unknown(&labels.state);
+    let open = bodies.holding(adjacency.open());
+    let at_mesh_edge = bodies.holding(adjacency.at_mesh_edge());
+    let doubtful = bodies.beside(adjacency, &unknown);
+    let mut triangles = vec![0usize; bodies.len()];
+    for &part in bodies.of.iter().filter(|&&part| part != NONE) {
+        triangles[part as usize] += 1;
+    }
+    let owned = |part: usize| mesh.in_core[bodies.lowest[part] as usize];
+    let closed = |part: usize| !open[part] && !doubtful[part];
+    let mut grains: Vec<Option<Segment>> = (0..bodies.len())
+        .map(|part| {
+            let publish = owned(part) && closed(part) && size[part] >= sizes.smallest;
+            let segment = |n| Segment { triangles: Vec::with_capacity(n), at_mesh_edge: at_mesh_edge[part] };
+            publish.then(|| segment(triangles[part]))
+        })
+        .collect();
+    let mut unsettled = oversize.unknown;
+    unsettled.extend(unknown.into_iter().filter(|&t| mesh.in_core[t as usize]));
+    for (t, part) in bodies.of.iter().enumerate().filter(|(_, part)| **part != NONE) {
+        let part = *part as usize;
+        if let Some(grain) = &mut grains[part] {
+            grain.triangles.push(t as u32);
+        } else if mesh.in_core[t] && owned(part) && !closed(part) {
+            unsettled.push(t as u32);
         }
     }
-    for (t, &part) in bodies.of.iter().enumerate() {
-        if let Some(&grain) = grain_of.get(part as usize)
-            && grain != NONE
-        {
-            settled.grains[grain as usize].triangles.push(t as u32);
-        }
-    }
-    settled
+    unsettled.sort_unstable();
+    unsettled.dedup();
+    Settled { grains: grains.into_iter().flatten().collect(), oversize: oversize.pieces, unsettled }
 }

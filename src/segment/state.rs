@@ -11,11 +11,18 @@ pub enum State {
     Unknown,
 }
 
-/// No body.
-pub const NONE: u32 = u32::MAX;
+/// The triangles of unknown state, ascending.
+pub fn unknown(state: &[State]) -> Vec<u32> {
+    (0..state.len() as u32).filter(|&t| state[t as usize] == State::Unknown).collect()
+}
+
+/// No body. All labels are below 2^31, so that a vertex can carry one and [`UNSURE`] in one number.
+pub const NONE: u32 = UNSURE - 1;
 /// The one label of all oversize bodies. One for all, because two pieces seen in a tile may be joined
 /// beyond its halo: whether they are must not change anything else.
-pub const OVERSIZE: u32 = u32::MAX - 1;
+pub const OVERSIZE: u32 = NONE - 1;
+/// Set in the label of a vertex where the cut could have changed it.
+pub const UNSURE: u32 = 1 << 31;
 
 /// States and labels of a tile's triangles. The label of a kept triangle is the local number of the
 /// lowest triangle of its body, once bodies are told apart.

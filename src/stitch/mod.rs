@@ -2,7 +2,7 @@
 //!
 //! Grains need no joining: each was published whole, once, by the tile that owns it. They are put in the
 //! order of their anchors, numbered, and coloured. Oversize bodies, which no tile sees whole, are joined
-//! by the triangle ids on both sides of every core border they cross.
+//! by the edges at which they leave a core.
 
 mod catalogue;
 mod color;

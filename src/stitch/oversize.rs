@@ -4,15 +4,11 @@ use super::catalogue::Oversize;
 use crate::geometry::{ExactSum, PlanBox};
 use crate::segment::OversizePiece;
 
-/// Joins pieces whose crossings meet: one names the border's two triangles as (inside, outside), the
-/// other as (outside, inside).
+/// Joins pieces that name the same edge.
 pub(super) fn join(mut pieces: Vec<OversizePiece>) -> Vec<Oversize> {
     pieces.sort_by_key(|p| p.anchor);
-    let mut crossings: Vec<([u64; 2], usize)> = pieces
-        .iter()
-        .enumerate()
-        .flat_map(|(i, p)| p.crossings.iter().map(move |&[a, b]| ([a.min(b), a.max(b)], i)))
-        .collect();
+    let mut crossings: Vec<([u64; 2], usize)> =
+        pieces.iter().enumerate().flat_map(|(i, p)| p.crossings.iter().map(move |&edge| (edge, i))).collect();
     crossings.sort_unstable();
     let mut parent: Vec<usize> = (0..pieces.len()).collect();
     for same in crossings.chunk_by(|a, b| a.0 == b.0) {
@@ -53,7 +49,8 @@ mod tests {
 
     #[test]
     fn pieces_that_cross_the_same_border_are_one_body() {
-        let pieces = vec![piece(9, &[[9, 4]]), piece(20, &[]), piece(3, &[[4, 9], [5, 30]]), piece(30, &[[30, 5]])];
+        let pieces =
+            vec![piece(9, &[[4, 9]]), piece(20, &[[1, 2]]), piece(3, &[[4, 9], [5, 30]]), piece(30, &[[5, 30]])];
         let bodies = join(pieces);
         let found: Vec<_> = bodies.iter().map(|b| (b.anchor, b.triangles)).collect();
         assert_eq!(found, [(3, 3), (20, 1)]);
