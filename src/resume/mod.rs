@@ -168,6 +168,14 @@ impl WorkFolder {
             // Nothing is lost if some of it stays; what others put there does.
             let _ = std::fs::remove_dir_all(self.shelf.path(INDEX));
             let _ = std::fs::remove_dir_all(self.shelf.path(CURVATURE));
+        }
+    }
+}
+
+impl Drop for WorkFolder {
+    fn drop(&mut self) {
+        if !self.stays {
+            // Only an empty folder can be removed: a run that kept nothing leaves no trace.
             let _ = std::fs::remove_dir(self.shelf.folder());
         }
     }
