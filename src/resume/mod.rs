@@ -23,7 +23,8 @@ use crate::error::Error;
 use crate::index::{Index, IndexError};
 use crate::open::Reach;
 use crate::settings::Settings;
-use crate::store::{Shelf, StoreError};
+use crate::store::{Ledger, Shelf, StoreError};
+use crate::tile::CoreSize;
 use identity::Identity;
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
@@ -179,6 +180,19 @@ impl Drop for WorkFolder {
             let _ = std::fs::remove_dir(self.shelf.folder());
         }
     }
+}
+
+/// The size of cores that a ledger has under `key`, or `size`, which is then recorded: tiles that are done are
+/// tiles of that size.
+fn recorded_core(ledger: &mut Ledger, key: u64, size: CoreSize) -> Result<CoreSize, StoreError> {
+    if let Some(position) = ledger.position(key)
+        && let Ok([a, b, c, d, e, f, g, h]) = <[u8; 8]>::try_from(ledger.read(position)?.payload)
+    {
+        let (columns, rows) = (u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h]));
+        return Ok(CoreSize { columns, rows });
+    }
+    ledger.append(key, &[size.columns.to_le_bytes(), size.rows.to_le_bytes()].concat())?;
+    Ok(size)
 }
 
 fn of_grains(reach: &Reach, settings: &Settings) -> Identity {
