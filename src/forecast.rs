@@ -16,8 +16,6 @@ const LARGEST_CORE: f64 = 1.6e7;
 const LARGEST_CURVATURE_CORE: f64 = 2e6;
 /// Triangles of a core with its first halo, for each of the core.
 const WITH_HALO: f64 = 1.3;
-/// Cores for each thread, at least, where the survey has enough triangles.
-const TILES_A_THREAD: f64 = 2.0;
 
 /// A run that needs more than there is.
 #[derive(Debug, thiserror::Error)]
@@ -107,7 +105,7 @@ pub fn core_sizes(index: &Index, settings: &Settings, threads: usize, memory: u6
         return CoreSizes { curvature: square, grains: square };
     }
     let triangles = index.scale.triangles as f64;
-    let shared = if threads > 1 { triangles / (TILES_A_THREAD * threads as f64) } else { triangles };
+    let shared = triangles / threads as f64;
     let size = |bytes: u64, least: f64, most: f64| {
         let fit = memory as f64 / threads as f64 / bytes as f64 / WITH_HALO;
         CoreSize::holding(index, fit.min(shared.max(least)).min(most), threads)

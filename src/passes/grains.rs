@@ -37,9 +37,11 @@ struct Halo {
 
 /// Part of a core's width that grains are taken to be wide where nothing is known.
 const UNKNOWN_WIDTH: f64 = 0.1;
-/// Part of a grain's width by which it may reach beyond a core to either side. It belongs to the tile of its
-/// southernmost triangles, which are mostly about its middle; to the north all of it may lie beyond.
-const SIDE_SHARE: f64 = 0.55;
+/// How far a tile looks to the north, in widths of a grain. A grain belongs to the tile of its southernmost
+/// triangles, so that most of it may lie beyond the core, and its neighbours must be seen whole as well.
+const NORTH_WIDTHS: f64 = 1.5;
+/// How far it looks elsewhere: what reaches into the core must be seen whole.
+const OTHER_WIDTHS: f64 = 1.0;
 /// How much further each attempt looks than the one before.
 const FURTHER: f64 = 1.6;
 
@@ -98,8 +100,12 @@ impl Survey<'_> {
         let core_width = f64::from((core.columns.end - core.columns.start).max(core.rows.end - core.rows.start));
         let widest = if settings.max_grain_m > 0.0 { settings.max_grain_m / cell_m } else { f64::MAX };
         let width = usual_width_m.map_or(UNKNOWN_WIDTH * core_width, |m| m / cell_m).min(widest);
-        let cells = |beyond: f64| ((self.rings(settings) + beyond) * FURTHER.powi(attempt)).ceil() as u32;
-        Halo { south: cells(0.0), beside: cells(SIDE_SHARE * width), north: cells(width) }
+        let cells = |widths: f64, attempt: i32| {
+            ((self.rings(settings) + widths * width) * FURTHER.powi(attempt.max(0))).ceil() as u32
+        };
+        // What is open after the first attempt mostly went on to the north.
+        let (other, north) = (cells(OTHER_WIDTHS, attempt - 1), cells(NORTH_WIDTHS, attempt));
+        Halo { south: other, beside: other, north }
     }
 
     fn first_block(&self, job: usize, recipe: &Recipe) -> CellBlock {
