@@ -86,6 +86,14 @@ impl Faces {
             }
         };
         let (first, size) = (list + self.length.size(), self.index.size());
+        if matches!(self.index, Scalar::I32 | Scalar::U32) {
+            // Nearly every mesh: three plain reads.
+            let read = |corner: usize| {
+                let at = first + corner * 4;
+                u64::from(u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]))
+            };
+            return [read(0), read(k + 1), read(k + 2)];
+        }
         // Validated to lie in 0..vertices, so the sign is gone.
         [0, k + 1, k + 2].map(|corner| self.index.integer(&bytes[first + corner * size..]) as u64)
     }

@@ -117,7 +117,8 @@ impl Reach {
     #[inline]
     pub fn triangle(&self, triangle: u64) -> [u64; 3] {
         let file = self.file_of(triangle, |f| f.first_triangle);
-        file.mesh.faces.triangle(file.mesh.bytes(), triangle - file.first_triangle).map(|v| v + file.first_vertex)
+        let [a, b, c] = file.mesh.faces.triangle(file.mesh.bytes(), triangle - file.first_triangle);
+        [a + file.first_vertex, b + file.first_vertex, c + file.first_vertex]
     }
 
     /// The face that a triangle is part of.
