@@ -2,6 +2,7 @@
 
 use super::columns::{Kind, Value};
 use super::gdal_calls::{create_boolean_field, set_fid};
+use super::gdal_options::GdalOptions;
 use super::gdal_watch::Watch;
 use super::layers::{self, Feature, Layer};
 use super::{Results, WriteError, atomic::Pending};
@@ -11,25 +12,8 @@ use gdal::spatial_ref::{AxisMappingStrategy, SpatialRef};
 use gdal::vector::{FieldDefn, Geometry, LayerAccess, LayerOptions, OGRFieldType, OGRwkbGeometryType};
 use gdal::{Dataset, DatasetOptions, DriverManager, GdalOpenFlags};
 
-/// The format wants a time of last change. While this lives GDAL writes a fixed one, so that equal runs
-/// give equal files.
-struct FixedDate;
-
-impl FixedDate {
-    const OPTION: &'static str = "OGR_CURRENT_DATE";
-
-    fn set() -> GdalResult<FixedDate> {
-        gdal::config::set_thread_local_config_option(Self::OPTION, "1970-01-01T00:00:00.000Z")?;
-        Ok(FixedDate)
-    }
-}
-
-impl Drop for FixedDate {
-    fn drop(&mut self) {
-        // Fails for a name with a NUL byte only, and this one has none.
-        let _ = gdal::config::clear_thread_local_config_option(Self::OPTION);
-    }
-}
+const OPTIONS: &[(&str, &str)] =
+    &[GdalOptions::FIXED_DATE, GdalOptions::NO_VALIDATION, GdalOptions::JOURNAL_IN_MEMORY, GdalOptions::FLUSHED_LATER];
 
 /// How many rows a layer must have.
 struct Expected {
@@ -64,7 +48,7 @@ fn system_of_layers(frame: &Frame) -> GdalResult<SpatialRef> {
 pub(crate) fn write(file: &Pending, results: &Results) -> Result<(), WriteError> {
     let watch = Watch::new(&file.target);
     let step = |text: &'static str| move || text.to_owned();
-    let _date = watch.step(step("setting up GDAL"), FixedDate::set())?;
+    let _options = watch.step(step("setting up GDAL"), GdalOptions::set(OPTIONS))?;
     let srs = watch.step(step("reading the coordinate reference system"), system_of_layers(results.frame))?;
     let created = DriverManager::get_driver_by_name("GPKG").and_then(|d| d.create_vector_only(&file.partial));
     let mut dataset = watch.step(step("creating the GeoPackage"), created)?;
