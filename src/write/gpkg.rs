@@ -2,6 +2,7 @@
 
 use super::columns::{Kind, Value};
 use super::gdal_calls::{create_boolean_field, set_fid};
+use super::gdal_options::GdalOptions;
 use super::gdal_watch::Watch;
 use super::layers::{self, Feature, Layer};
 use super::{Results, WriteError, atomic::Pending};
@@ -11,25 +12,8 @@ use gdal::spatial_ref::{AxisMappingStrategy, SpatialRef};
 use gdal::vector::{FieldDefn, Geometry, LayerAccess, LayerOptions, OGRFieldType, OGRwkbGeometryType};
 use gdal::{Dataset, DatasetOptions, DriverManager, GdalOpenFlags};
 
-/// The format wants a time of last change. While this lives GDAL writes a fixed one, so that equal runs
-/// give equal files.
-struct FixedDate;
-
-impl FixedDate {
-    const OPTION: &'static str = "OGR_CURRENT_DATE";
-
-    fn set() -> GdalResult<FixedDate> {
-        gdal::config::set_thread_local_config_option(Self::OPTION, "1970-01-01T00:00:00.000Z")?;
-        Ok(FixedDate)
-    }
-}
-
-impl Drop for FixedDate {
-    fn drop(&mut self) {
-        // Fails for a name with a NUL byte only, and this one has none.
-        let _ = gdal::config::clear_thread_local_config_option(Self::OPTION);
-    }
-}
+const OPTIONS: &[(&str, &str)] =
+    &[GdalOptions::FIXED_DATE, GdalOptions::NO_VALIDATION, GdalOptions::JOURNAL_IN_MEMORY, GdalOptions::FLUSHED_LATER];
 
 /// How many rows a layer must have.
 struct Expected {
@@ -60,11 +44,11 @@ fn system_of_layers(frame: &Frame) -> GdalResult<SpatialRef> {
     ))
 }
 
-/// Writes the file in one transaction, adds the spatial indices, and reads it back.
+/// Writes the file, with its spatial indices, in one transaction, and reads it back.
 pub(crate) fn write(file: &Pending, results: &Results) -> Result<(), WriteError> {
     let watch = Watch::new(&file.target);
     let step = |text: &'static str| move || text.to_owned();
-    let _date = watch.step(step("setting up GDAL"), FixedDate::set())?;
+    let _options = watch.step(step("setting up GDAL"), GdalOptions::set(OPTIONS))?;
     let srs = watch.step(step("reading the coordinate reference system"), system_of_layers(results.frame))?;
     let created = DriverManager::get_driver_by_name("GPKG").and_then(|d| d.create_vector_only(&file.partial));
     let mut dataset = watch.step(step("creating the GeoPackage"), created)?;
@@ -74,16 +58,16 @@ pub(crate) fn write(file: &Pending, results: &Results) -> Result<(), WriteError>
         for layer in layers::all(results) {
             expected.push(write_layer(&watch, &mut transaction, &srs, layer)?);
         }
-        watch.step(step("committing the layers"), transaction.commit())?;
-    }
-    for layer in expected.iter().filter(|l| l.shapes.is_some()) {
-        let name = layer.layer;
-        let made = number(&dataset, &format!("SELECT CreateSpatialIndex('{name}', 'geom')"));
-        let made = watch.step(|| format!("building the spatial index of layer {name}"), made)?;
-        if made != Some(1) {
-            let (path, what) = (file.target.clone(), "spatial indices");
-            return Err(WriteError::IncompleteLayer { path, layer: name.into(), what, expected: 1, found: 0 });
+        for layer in expected.iter().filter(|l| l.shapes.is_some()) {
+            let name = layer.layer;
+            let made = numbers(&transaction, &[format!("CreateSpatialIndex('{name}', 'geom')")]);
+            let made = watch.step(|| format!("building the spatial index of layer {name}"), made)?;
+            if made != [Some(1)] {
+                let (path, what) = (file.target.clone(), "spatial indices");
+                return Err(WriteError::IncompleteLayer { path, layer: name.into(), what, expected: 1, found: 0 });
+            }
         }
+        watch.step(step("committing the layers"), transaction.commit())?;
     }
     watch.step(step("closing the GeoPackage"), dataset.close())?;
     verify(file, &watch, &expected)
@@ -144,12 +128,32 @@ fn add_feature(layer: &gdal::vector::Layer, feature: &Feature) -> GdalResult<()>
     out.create(layer)
 }
 
-/// First field of the first row of a query.
-fn number(dataset: &Dataset, query: &str) -> GdalResult<Option<i64>> {
-    let Some(mut rows) = dataset.execute_sql(query, None, gdal::vector::sql::Dialect::DEFAULT)? else {
-        return Ok(None);
+/// The values of some expressions, asked for at once since GDAL makes a layer of every query; none for NULL.
+fn numbers(dataset: &Dataset, expressions: &[String]) -> GdalResult<Vec<Option<i64>>> {
+    let query = format!("SELECT {}", expressions.join(", "));
+    let mut rows = dataset.execute_sql(query, None, gdal::vector::sql::Dialect::DEFAULT)?;
+    let row = rows.as_mut().and_then(|rows| rows.features().next());
+    (0..expressions.len()).map(|i| row.as_ref().map_or(Ok(None), |row| row.field_as_integer64(i))).collect()
+}
+
+/// A table and how many rows it must have.
+struct Count {
+    layer: &'static str,
+    what: &'static str,
+    table: String,
+    expected: u64,
+}
+
+fn counts(expected: &[Expected]) -> Vec<Count> {
+    let of_layer = |&Expected { layer, features, shapes }: &Expected| {
+        let all = Count { layer, what: "features", table: layer.into(), expected: features };
+        let index = |shapes| {
+            let (what, table) = ("rows of the spatial index", format!("rtree_{layer}_geom"));
+            Count { layer, what, table, expected: shapes }
+        };
+        [Some(all), shapes.map(index)].into_iter().flatten()
     };
-    rows.features().next().map_or(Ok(None), |row| row.field_as_integer64(0))
+    expected.iter().flat_map(of_layer).collect()
 }
 
 /// Opens the closed file again: before GDAL 3.7 a full disk can go unreported when a file is closed.
@@ -161,19 +165,16 @@ fn verify(file: &Pending, watch: &Watch, expected: &[Expected]) -> Result<(), Wr
     };
     let opened = Dataset::open_ex(&file.partial, options);
     let dataset = watch.step(|| "opening the finished GeoPackage".into(), opened)?;
-    for Expected { layer, features, shapes } in expected {
-        let mut counts = vec![("features", format!("SELECT COUNT(*) FROM \"{layer}\""), *features)];
-        if let Some(shapes) = shapes {
-            let query = format!("SELECT COUNT(*) FROM \"rtree_{layer}_geom\"");
-            counts.push(("rows of the spatial index", query, *shapes));
-        }
-        for (what, query, expected) in counts {
-            let found = watch.step(|| format!("counting the {what} of layer {layer}"), number(&dataset, &query))?;
-            let found = found.and_then(|n| u64::try_from(n).ok()).unwrap_or(0);
-            if found != expected {
-                let (path, layer) = (file.target.clone(), (*layer).to_owned());
-                return Err(WriteError::IncompleteLayer { path, layer, what, expected, found });
-            }
+    let counts = counts(expected);
+    let queries: Vec<String> =
+        counts.iter().map(|count| format!("(SELECT COUNT(*) FROM \"{}\")", count.table)).collect();
+    // One query: GDAL makes a layer of every result.
+    let found = watch.step(|| "counting what the layers hold".into(), numbers(&dataset, &queries))?;
+    for (Count { layer, what, expected, .. }, found) in counts.into_iter().zip(found) {
+        let found = found.and_then(|n| u64::try_from(n).ok()).unwrap_or(0);
+        if found != expected {
+            let (path, layer) = (file.target.clone(), layer.to_owned());
+            return Err(WriteError::IncompleteLayer { path, layer, what, expected, found });
         }
     }
     watch.step(|| "closing the finished GeoPackage".into(), dataset.close())

@@ -14,6 +14,7 @@ pub mod columns;
 mod csv;
 mod error;
 mod gdal_calls;
+mod gdal_options;
 mod gdal_watch;
 mod geotiff;
 mod gpkg;
