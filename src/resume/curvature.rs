@@ -1,9 +1,10 @@
 //! Spacing and divergence on disk, with a record of which tiles are done.
 
 use crate::index::Index;
-use crate::store::{Column, Ledger, Shelf, StoreError};
+use crate::store::{Column, Ledger, Shelf, StoreError, fail_point};
 use crate::tile::Plan;
 use std::hash::Hasher;
+use std::ops::Range;
 use twox_hash::XxHash3_64;
 
 const LEDGER: &str = "tiles";
@@ -16,15 +17,9 @@ const TILES: u64 = 2;
 /// What is known of a survey's curvature.
 #[derive(Debug)]
 pub struct Curvature {
-    /// Divergence by vertex, 1/m; only of tiles that are done.
-    pub divergence: Column<f64>,
-    /// Which these are.
-    pub tiles: TilesDone,
+    divergence: Column<f64>,
+    tiles: Ledger,
 }
-
-/// Which tiles have their divergence.
-#[derive(Debug)]
-pub struct TilesDone(Ledger);
 
 impl Curvature {
     pub(super) fn open(shelf: &Shelf, identity: &str, index: &Index) -> Result<Curvature, StoreError> {
@@ -39,7 +34,7 @@ impl Curvature {
                 shelf.create(DIVERGENCE, index.scale.vertices)?
             }
         };
-        Ok(Curvature { divergence, tiles: TilesDone(ledger) })
+        Ok(Curvature { divergence, tiles: ledger })
     }
 
     /// The side of the tiles whose records are here, metres; otherwise `side_m`, which it is from now on.
@@ -59,14 +54,14 @@ impl Curvature {
     }
 
     fn number<E: From<StoreError>>(&mut self, key: u64, find: impl FnOnce() -> Result<f64, E>) -> Result<f64, E> {
-        if let Some(position) = self.tiles.0.position(key) {
-            let record = self.tiles.0.read(position)?;
+        if let Some(position) = self.tiles.position(key) {
+            let record = self.tiles.read(position)?;
             if let Ok(bytes) = record.payload.try_into() {
                 return Ok(f64::from_le_bytes(bytes));
             }
         }
         let found = find()?;
-        self.tiles.0.append(key, &found.to_le_bytes())?;
+        self.tiles.append(key, &found.to_le_bytes())?;
         Ok(found)
     }
 
@@ -78,8 +73,8 @@ impl Curvature {
     pub fn missing(&self, index: &Index, plan: &Plan) -> Result<Vec<usize>, StoreError> {
         let mut missing = Vec::new();
         for (job, tile) in plan.tiles.iter().enumerate() {
-            let recorded = match self.tiles.0.position(TILES + tile.id) {
-                Some(position) => Some(self.tiles.0.read(position)?.payload),
+            let recorded = match self.tiles.position(TILES + tile.id) {
+                Some(position) => Some(self.tiles.read(position)?.payload),
                 None => None,
             };
             let whole = match recorded {
@@ -98,15 +93,34 @@ impl Curvature {
         }
         Ok(missing)
     }
-}
 
-impl TilesDone {
-    /// Records that the values of a tile, given again here, are written.
+    /// Keeps the values of a tile: its runs of vertices, and behind one another the values of all.
     ///
     /// # Errors
     /// The disk says no.
-    pub fn done(&mut self, tile: u64, values: &[f64]) -> Result<(), StoreError> {
-        self.0.append(TILES + tile, &checksum(values)).map(|_| ())
+    pub fn add(&mut self, tile: u64, runs: &[Range<u64>], values: &[f64]) -> Result<(), StoreError> {
+        let mut rest = values;
+        for run in runs {
+            let (of_run, after) = rest.split_at((run.end - run.start) as usize);
+            self.divergence.write(run.start, of_run.iter().copied())?;
+            rest = after;
+        }
+        fail_point("curvature.before_record");
+        self.tiles.append(TILES + tile, &checksum(values)).map(|_| ())
+    }
+
+    /// Flushes all of it to the disk.
+    ///
+    /// # Errors
+    /// The disk says no.
+    pub fn sync(&mut self) -> Result<(), StoreError> {
+        self.divergence.sync()?;
+        self.tiles.sync()
+    }
+
+    /// Divergence by vertex, 1/m; only of tiles that are done.
+    pub fn divergence(&self) -> &Column<f64> {
+        &self.divergence
     }
 }
 
