@@ -4,6 +4,7 @@ use crate::demo::DemoError;
 use crate::forecast::ForecastError;
 use crate::index::IndexError;
 use crate::open::OpenError;
+use crate::passes::TileError;
 use crate::pipeline::{Interrupted, LostJob, Stopped};
 use crate::resume::ResumeError;
 use crate::settings::SettingsError;
@@ -57,6 +58,9 @@ pub enum Error {
     /// The run needs more than there is.
     #[error(transparent)]
     Forecast(#[from] ForecastError),
+    /// A look at part of the survey failed.
+    #[error(transparent)]
+    Tile(#[from] TileError),
     /// The compute threads could not be started.
     #[error("cannot start {threads} compute threads: {source}\nhelp: ask for fewer with --threads")]
     Threads {

@@ -4,20 +4,20 @@ use crate::index::{BuildRoom, Index, disk_bytes};
 use crate::open::Reach;
 use crate::passes::Survey;
 use crate::settings::Settings;
-use crate::tile::{NormalField, Plan, TileMesh};
+use crate::tile::{CoreSize, NormalField, TileMesh};
 
 /// Memory of the program itself, of GDAL and of buffers, bytes.
 const BASE_BYTES: u64 = 64 << 20;
 /// Memory for tiles, or for sorting, without which a run makes no sense, bytes.
 const LEAST_BYTES: u64 = 16 << 20;
 /// Largest core of the grain pass, triangles: more only makes the last tile wait for longer.
-const LARGEST_CORE: f64 = 8e6;
+const LARGEST_CORE: f64 = 1.6e7;
 /// Largest core of the curvature pass, triangles.
 const LARGEST_CURVATURE_CORE: f64 = 2e6;
 /// Triangles of a core with its first halo, for each of the core.
 const WITH_HALO: f64 = 1.3;
 /// Cores for each thread, at least, where the survey has enough triangles.
-const TILES_A_THREAD: f64 = 3.0;
+const TILES_A_THREAD: f64 = 2.0;
 
 /// A run that needs more than there is.
 #[derive(Debug, thiserror::Error)]
@@ -92,29 +92,29 @@ pub fn disk(reach: &Reach, folder: &str, free: Option<u64>) -> Result<u64, Forec
     }
 }
 
-/// The side of a core, metres, as the settings have it or as the memory allows.
-pub struct Sides {
-    /// Of the passes that store one number for each vertex.
-    pub curvature_m: f64,
-    /// Of the grain pass.
-    pub grains_m: f64,
+/// The size of cores, as the settings have it or as the memory allows.
+pub struct CoreSizes {
+    /// In the passes that store one number for each vertex.
+    pub curvature: CoreSize,
+    /// In the grain pass.
+    pub grains: CoreSize,
 }
 
 /// How large cores may be if `threads` tiles are worked at once in `memory` bytes.
-pub fn sides(index: &Index, settings: &Settings, threads: usize, memory: u64) -> Sides {
-    let chosen = settings.work.tile_size_m;
-    if chosen > 0.0 {
-        return Sides { curvature_m: chosen, grains_m: chosen };
+pub fn core_sizes(index: &Index, settings: &Settings, threads: usize, memory: u64) -> CoreSizes {
+    if settings.work.tile_size_m > 0.0 {
+        let square = CoreSize::square(index, settings.work.tile_size_m);
+        return CoreSizes { curvature: square, grains: square };
     }
     let triangles = index.scale.triangles as f64;
     let shared = if threads > 1 { triangles / (TILES_A_THREAD * threads as f64) } else { triangles };
-    let side_m = |bytes: u64, least: f64, most: f64| {
+    let size = |bytes: u64, least: f64, most: f64| {
         let fit = memory as f64 / threads as f64 / bytes as f64 / WITH_HALO;
-        Plan::side_m(index, fit.min(shared.max(least)).min(most))
+        CoreSize::holding(index, fit.min(shared.max(least)).min(most), threads)
     };
-    Sides {
-        curvature_m: side_m(NormalField::footprint_bytes(1), 2.5e5, LARGEST_CURVATURE_CORE),
-        grains_m: side_m(TileMesh::footprint_bytes(1), 1e6, LARGEST_CORE),
+    CoreSizes {
+        curvature: size(NormalField::footprint_bytes(1), 2.5e5, LARGEST_CURVATURE_CORE),
+        grains: size(TileMesh::footprint_bytes(1), 1e6, LARGEST_CORE),
     }
 }
 

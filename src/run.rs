@@ -97,15 +97,16 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     check_outputs(&reach, &index, settings)?;
 
     // plan
-    let sides = forecast::sides(&index, settings, threads, room.bytes);
+    let sizes = forecast::core_sizes(&index, settings, threads, room.bytes);
     let mut curvature = work.curvature(&reach, &index, settings)?;
-    let vertex_plan = Plan::new(&index, curvature.side_m(sides.curvature_m)?);
-    let plan = Plan::new(&index, findings.side_m(sides.grains_m)?);
+    let vertex_plan = Plan::new(&index, curvature.core(sizes.curvature)?);
+    let plan = Plan::new(&index, findings.core(sizes.grains)?);
     let tiles_bytes = forecast::tiles_bytes(&Survey { index: &index, plan: &plan }, settings, threads, room.bytes)?;
     progress.note(&format!(
-        "{} tiles of {:.3} m, {threads} threads; peak memory about {} MiB of {} MiB",
+        "{} tiles of {:.3} x {:.3} m, {threads} threads; peak memory about {} MiB of {} MiB",
         plan.tiles.len(),
-        plan.tile_size_m,
+        plan.core_m(&index)[0],
+        plan.core_m(&index)[1],
         (tiles_bytes + forecast::fixed_bytes(&reach)) >> 20,
         memory >> 20
     ));
@@ -127,8 +128,11 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     // tile by tile: segment and measure
     let outline_step_m = reach.frame().outline_step_m();
     let wanted = Wanted { outline_step_m, triangle_ids: settings.output.labelled_mesh };
-    let recipe = Recipe { settings: &settings.segment, divergence: curvature.divergence(), wanted };
+    let recipe =
+        Recipe { settings: &settings.segment, divergence: curvature.divergence(), wanted, usual_width_m: None };
     let survey = Survey { index: &index, plan: &plan };
+    let probe = crew.pool.install(|| survey.probe(&recipe))?;
+    let recipe = Recipe { usual_width_m: probe.usual_width_m, ..recipe };
     let jobs = findings.missing(&plan);
     if jobs.len() < plan.tiles.len() {
         progress.note(&format!("{} of {} tiles are done already", plan.tiles.len() - jobs.len(), plan.tiles.len()));
@@ -144,7 +148,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
 
     // statistics and write
     let mut facts = facts(&reach, &index, &plan, &warnings, &lost);
-    let segmented_per_triangle = segmented_per_triangle(&tiles);
+    let segmented_per_triangle = segmented_per_triangle(&tiles, probe.segmented);
     facts["segmented_per_triangle"] = segmented_per_triangle.into();
     let mesh = WholeMesh::new(&reach);
     let surveyed = index.triangles.occupied(&index.grid);
@@ -251,8 +255,8 @@ fn write(
     Ok(folder.publish(written)?)
 }
 
-fn segmented_per_triangle(tiles: &[TileReport]) -> f64 {
-    let (loaded, owned) = tiles.iter().fold((0, 0), |(l, o), t| (l + t.segmented_triangles, o + t.core_triangles));
+fn segmented_per_triangle(tiles: &[TileReport], probed: u64) -> f64 {
+    let (loaded, owned) = tiles.iter().fold((probed, 0), |(l, o), t| (l + t.segmented_triangles, o + t.core_triangles));
     loaded as f64 / owned.max(1) as f64
 }
 
@@ -285,7 +289,7 @@ fn facts(reach: &Reach, index: &Index, plan: &Plan, warnings: &[String], lost: &
         "warnings": warnings,
         "lost_tiles": lost,
         "tiles": plan.tiles.len(),
-        "tile_size_m": plan.tile_size_m,
+        "core_m": plan.core_m(index),
         "mean_edge_m": index.scale.mean_edge_m,
         "mean_triangle_area_m2": index.scale.mean_triangle_area_m2,
         "spacing_m": index.scale.spacing_m,

@@ -20,7 +20,7 @@ use gravelometer::segment::{Settled, segment};
 use gravelometer::settings::{AreaRule, ConcaveRule, CurvatureSettings, SegmentSettings};
 use gravelometer::stitch::{Catalogue, TileReport, stitch};
 use gravelometer::store::{Column, Shelf};
-use gravelometer::tile::{Owned, Plan, TileMesh, each_of};
+use gravelometer::tile::{CoreSize, Owned, Plan, TileMesh, each_of};
 use std::convert::Infallible;
 use std::ops::Range;
 use support::bed::{Rng, bed, shuffled};
@@ -52,7 +52,7 @@ fn worked(surface: &MemorySurface, tiling: Tiling) -> Worked<'_> {
     let crew = crew(tiling);
     let room = BuildRoom { bytes: tiling.memory_bytes, wide: tiling.threads > 1 };
     let mut index = crew.pool.install(|| support::indexed_with(surface, room));
-    let plan = Plan::new(&index, tiling.tile_size_m);
+    let plan = Plan::new(&index, CoreSize::square(&index, tiling.tile_size_m));
     let (spacing_m, lost) = Survey { index: &index, plan: &plan }.spacing(&crew, &Silent).unwrap();
     assert!(lost.is_empty(), "{lost:?}");
     index.scale.spacing_m = spacing_m;
@@ -78,9 +78,9 @@ fn values(column: &Column<f64>) -> Vec<f64> {
 }
 
 fn catalogue(worked: &Worked, settings: &SegmentSettings, tiling: Tiling) -> (Catalogue, Vec<TileReport>) {
-    let plan = Plan::new(&worked.index, tiling.tile_size_m);
+    let plan = Plan::new(&worked.index, CoreSize::square(&worked.index, tiling.tile_size_m));
     let survey = Survey { index: &worked.index, plan: &plan };
-    let recipe = Recipe { settings, divergence: &worked.divergence, wanted: WANTED };
+    let recipe = Recipe { settings, divergence: &worked.divergence, wanted: WANTED, usual_width_m: None };
     let jobs: Vec<usize> = (0..plan.tiles.len()).collect();
     let mut findings = Vec::new();
     let collect = |_, finding| {
@@ -206,7 +206,11 @@ fn every_recipe_gives_the_same_catalogue_bit_for_bit_whatever_the_tiles_threads_
                 }
                 let (found, tiles) = catalogue(&tiled, recipe, tiling);
                 assert_same(&expected[r], &found, &format!("{name}, {tiling:?}, {} tiles", tiles.len()));
-                seen.add(&found, &tiles, Plan::new(&tiled.index, tiling.tile_size_m).tile_size_m);
+                seen.add(
+                    &found,
+                    &tiles,
+                    Plan::new(&tiled.index, CoreSize::square(&tiled.index, tiling.tile_size_m)).core_m(&tiled.index)[0],
+                );
             }
         }
     }

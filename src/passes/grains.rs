@@ -22,6 +22,9 @@ pub struct Recipe<'a> {
     pub divergence: &'a Column<f64>,
     /// What to measure.
     pub wanted: Wanted,
+    /// How wide most grains are in plan, metres, if that is known: how far a tile looks at first. Never changes
+    /// a result.
+    pub usual_width_m: Option<f64>,
 }
 
 /// How far a tile looks beyond its core at first, cells.
@@ -32,11 +35,13 @@ struct Halo {
     north: u32,
 }
 
-/// Share of a core's width that its first halo may take to the north. A grain belongs to the tile of its
-/// southernmost triangles, so that this is where most of it is looked for.
-const NORTH_SHARE: f64 = 0.08;
-/// The same to either side.
-const SIDE_SHARE: f64 = 0.04;
+/// Part of a core's width that grains are taken to be wide where nothing is known.
+const UNKNOWN_WIDTH: f64 = 0.1;
+/// Part of a grain's width by which it may reach beyond a core to either side. It belongs to the tile of its
+/// southernmost triangles, which are mostly about its middle; to the north all of it may lie beyond.
+const SIDE_SHARE: f64 = 0.55;
+/// How much further each attempt looks than the one before.
+const FURTHER: f64 = 1.6;
 
 /// What was found in a tile so far.
 #[derive(Default)]
@@ -61,9 +66,7 @@ impl Survey<'_> {
         mut collect: impl FnMut(usize, TileFinding) -> Result<(), C>,
     ) -> Result<Vec<LostJob>, Stopped<C>> {
         let stages = Stages {
-            footprint_bytes: |job| {
-                TileMesh::footprint_bytes(self.triangles_in(&self.first_block(job, recipe.settings)))
-            },
+            footprint_bytes: |job| TileMesh::footprint_bytes(self.triangles_in(&self.first_block(job, recipe))),
             work: |job, reservation: &mut Reservation| self.tile(job, recipe, reservation),
         };
         let triangles = jobs.iter().map(|&job| self.triangles_in(self.core(job))).sum();
@@ -78,27 +81,30 @@ impl Survey<'_> {
 
     /// Bytes that the largest tile takes at first.
     pub fn largest_bytes(&self, settings: &SegmentSettings) -> u64 {
-        let triangles = |job| self.triangles_in(&self.first_block(job, settings));
+        let block = |job| self.grown(self.core(job), self.halo(self.core(job), settings, None, 0));
+        let triangles = |job| self.triangles_in(&block(job));
         TileMesh::footprint_bytes((0..self.plan.tiles.len()).map(triangles).max().unwrap_or(0))
     }
 
     /// The rings of triangles that the steps look beyond a body, cells.
-    fn rings(&self, settings: &SegmentSettings) -> u32 {
+    fn rings(&self, settings: &SegmentSettings) -> f64 {
         let rings = settings.erosion_iterations + settings.dilation_iterations + 2;
-        (f64::from(rings) * 3.0 * self.index.scale.mean_edge_m / self.index.grid.cell_m).ceil() as u32
+        f64::from(rings) * 3.0 * self.index.scale.mean_edge_m / self.index.grid.cell_m
     }
 
-    fn first_halo(&self, core: &CellBlock, settings: &SegmentSettings) -> Halo {
-        let rings = self.rings(settings);
-        let width = f64::from((core.columns.end - core.columns.start).max(core.rows.end - core.rows.start));
-        let widest = if settings.max_grain_m > 0.0 { settings.max_grain_m / self.index.grid.cell_m } else { f64::MAX };
-        let share = |share: f64| rings.saturating_add((share * width).min(widest).ceil() as u32);
-        Halo { south: rings, beside: share(SIDE_SHARE), north: share(NORTH_SHARE) }
+    /// How far a tile looks in its first attempt, the second, and so on.
+    fn halo(&self, core: &CellBlock, settings: &SegmentSettings, usual_width_m: Option<f64>, attempt: i32) -> Halo {
+        let cell_m = self.index.grid.cell_m;
+        let core_width = f64::from((core.columns.end - core.columns.start).max(core.rows.end - core.rows.start));
+        let widest = if settings.max_grain_m > 0.0 { settings.max_grain_m / cell_m } else { f64::MAX };
+        let width = usual_width_m.map_or(UNKNOWN_WIDTH * core_width, |m| m / cell_m).min(widest);
+        let cells = |beyond: f64| ((self.rings(settings) + beyond) * FURTHER.powi(attempt)).ceil() as u32;
+        Halo { south: cells(0.0), beside: cells(SIDE_SHARE * width), north: cells(width) }
     }
 
-    fn first_block(&self, job: usize, settings: &SegmentSettings) -> CellBlock {
+    fn first_block(&self, job: usize, recipe: &Recipe) -> CellBlock {
         let core = self.core(job);
-        self.grown(core, self.first_halo(core, settings))
+        self.grown(core, self.halo(core, recipe.settings, recipe.usual_width_m, 0))
     }
 
     fn grown(&self, block: &CellBlock, halo: Halo) -> CellBlock {
@@ -113,17 +119,18 @@ impl Survey<'_> {
     fn tile(&self, job: usize, recipe: &Recipe, reservation: &mut Reservation) -> Result<TileFinding, TileError> {
         panic_point("grains", self.plan.tiles[job].id);
         let core = self.core(job);
-        let first = self.first_block(job, recipe.settings);
+        let first = self.first_block(job, recipe);
         let mut found = Found::default();
         let mut open = self.attempt(Owned::Cells(core), &first, recipe, &mut found)?;
         // From here on small blocks around what is open are worked, and wider ones each time.
-        let mut cells = self.first_halo(core, recipe.settings).north;
+        let mut attempt = 1;
         while !open.is_empty() {
             let mut still_open = Vec::new();
-            for cluster in clusters(self.index, &open, cells) {
-                let block = self.index.grid.grown(&cluster.cells, cells);
+            let halo = self.halo(core, recipe.settings, recipe.usual_width_m, attempt);
+            for cluster in clusters(self.index, &open, halo.beside) {
+                let block = self.grown(&cluster.cells, halo);
                 let triangles = self.triangles_in(&block);
-                let halo_m = f64::from(cells) * self.index.grid.cell_m;
+                let halo_m = f64::from(halo.north) * self.index.grid.cell_m;
                 reservation
                     .change_to(TileMesh::footprint_bytes(triangles))
                     .map_err(|over| TileError::TooWide { halo_m, over })?;
@@ -134,7 +141,7 @@ impl Survey<'_> {
             }
             still_open.sort_unstable();
             open = still_open;
-            cells = cells.saturating_mul(2);
+            attempt += 1;
         }
         Ok(self.finding(job, found))
     }

@@ -7,8 +7,10 @@
 mod again;
 mod grains;
 mod per_vertex;
+mod probe;
 
 pub use grains::Recipe;
+pub use probe::Probe;
 
 use crate::index::{CellBlock, Index};
 use crate::pipeline::OverBudget;

@@ -1,16 +1,17 @@
 //! Spacing and divergence on disk, with a record of which tiles are done.
 
+use super::recorded_core;
 use crate::index::Index;
 use crate::store::{Column, Ledger, Shelf, StoreError, fail_point};
-use crate::tile::Plan;
+use crate::tile::{CoreSize, Plan};
 use std::hash::Hasher;
 use std::ops::Range;
 use twox_hash::XxHash3_64;
 
 const LEDGER: &str = "tiles";
 const DIVERGENCE: &str = "divergence";
-/// Records: the side of a tile, the spacing, and behind them the tiles by their number.
-const SIDE: u64 = 0;
+/// Records: the size of a core, the spacing, and behind them the tiles by their number.
+const SIZE: u64 = 0;
 const SPACING: u64 = 1;
 const TILES: u64 = 2;
 
@@ -37,12 +38,12 @@ impl Curvature {
         Ok(Curvature { divergence, tiles: ledger })
     }
 
-    /// The side of the tiles whose records are here, metres; otherwise `side_m`, which it is from now on.
+    /// The size of the cores whose records are here; otherwise `size`, which it is from now on.
     ///
     /// # Errors
     /// The disk says no.
-    pub fn side_m(&mut self, side_m: f64) -> Result<f64, StoreError> {
-        self.number(SIDE, || Ok::<_, StoreError>(side_m))
+    pub fn core(&mut self, size: CoreSize) -> Result<CoreSize, StoreError> {
+        recorded_core(&mut self.tiles, SIZE, size)
     }
 
     /// The spacing, metres: the recorded one, or the one that `measure` finds, which is recorded.
@@ -50,18 +51,14 @@ impl Curvature {
     /// # Errors
     /// Those of `measure`, and the disk's.
     pub fn spacing_m<E: From<StoreError>>(&mut self, measure: impl FnOnce() -> Result<f64, E>) -> Result<f64, E> {
-        self.number(SPACING, measure)
-    }
-
-    fn number<E: From<StoreError>>(&mut self, key: u64, find: impl FnOnce() -> Result<f64, E>) -> Result<f64, E> {
-        if let Some(position) = self.tiles.position(key) {
+        if let Some(position) = self.tiles.position(SPACING) {
             let record = self.tiles.read(position)?;
             if let Ok(bytes) = record.payload.try_into() {
                 return Ok(f64::from_le_bytes(bytes));
             }
         }
-        let found = find()?;
-        self.tiles.append(key, &found.to_le_bytes())?;
+        let found = measure()?;
+        self.tiles.append(SPACING, &found.to_le_bytes())?;
         Ok(found)
     }
 

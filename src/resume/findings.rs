@@ -1,12 +1,13 @@
 //! What tiles found, on disk until all are done: memory for tiles is free again when they are read.
 
+use super::recorded_core;
 use crate::error::Error;
 use crate::stitch::TileFinding;
 use crate::store::{Ledger, Shelf, StoreError};
-use crate::tile::Plan;
+use crate::tile::{CoreSize, Plan};
 
-/// Records: the side of a tile, and behind it the tiles by their number.
-const SIDE: u64 = 0;
+/// Records: the size of a core, and behind it the tiles by their number.
+const SIZE: u64 = 0;
 const TILES: u64 = 1;
 
 /// The findings of a run so far.
@@ -20,18 +21,12 @@ impl Findings {
         Ok(Findings { ledger: shelf.ledger_of(name, identity)?.0 })
     }
 
-    /// The side of the tiles whose records are here, metres; otherwise `side_m`, which it is from now on.
+    /// The size of the cores whose records are here; otherwise `size`, which it is from now on.
     ///
     /// # Errors
     /// The disk says no.
-    pub fn side_m(&mut self, side_m: f64) -> Result<f64, StoreError> {
-        if let Some(position) = self.ledger.position(SIDE)
-            && let Ok(bytes) = self.ledger.read(position)?.payload.try_into()
-        {
-            return Ok(f64::from_le_bytes(bytes));
-        }
-        self.ledger.append(SIDE, &side_m.to_le_bytes())?;
-        Ok(side_m)
+    pub fn core(&mut self, size: CoreSize) -> Result<CoreSize, StoreError> {
+        recorded_core(&mut self.ledger, SIZE, size)
     }
 
     /// The tiles of the plan that have no finding, by their place in it.

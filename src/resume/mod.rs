@@ -24,7 +24,8 @@ use crate::error::Error;
 use crate::index::{Index, IndexError};
 use crate::open::Reach;
 use crate::settings::Settings;
-use crate::store::{Shelf, StoreError, fail_point};
+use crate::store::{Ledger, Shelf, StoreError, fail_point};
+use crate::tile::CoreSize;
 use identity::Identity;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -225,12 +226,12 @@ impl WorkFolder {
 }
 
 impl Drop for WorkFolder {
-    /// A run that ends before it has kept anything leaves nothing behind.
+    /// A run that ends before it has kept anything leaves nothing behind. Curvature is only there when an index
+    /// was, and outlives one that is made again.
     fn drop(&mut self) {
-        if !self.ours || Index::is_kept_in(&self.shelf.path(INDEX)) {
+        if !self.ours || Index::is_kept_in(&self.shelf.path(INDEX)) || self.shelf.has(CURVATURE) {
             return;
         }
-        self.remove(CURVATURE);
         self.remove(INDEX);
         self.shelf.remove(GRAINS);
         if !self.stays {
@@ -241,4 +242,17 @@ impl Drop for WorkFolder {
 
 fn place(named: Option<&Path>, out: &Path) -> PathBuf {
     named.map_or_else(|| out.join(WORK), Path::to_owned)
+}
+
+/// The size of cores that a ledger has under `key`, or `size`, which is then recorded: tiles that are done are
+/// tiles of that size.
+fn recorded_core(ledger: &mut Ledger, key: u64, size: CoreSize) -> Result<CoreSize, StoreError> {
+    if let Some(position) = ledger.position(key)
+        && let Ok([a, b, c, d, e, f, g, h]) = <[u8; 8]>::try_from(ledger.read(position)?.payload)
+    {
+        let (columns, rows) = (u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h]));
+        return Ok(CoreSize { columns, rows });
+    }
+    ledger.append(key, &[size.columns.to_le_bytes(), size.rows.to_le_bytes()].concat())?;
+    Ok(size)
 }

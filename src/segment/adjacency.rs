@@ -71,10 +71,9 @@ impl Adjacency {
             at_mesh_edge: Vec::new(),
         };
         let mut first = 0;
-        for low in 0..mesh.positions.len() {
-            let last = end[low] as usize;
-            adjacency.pair_up(mesh, low as u32, &mut halves[first..last]);
-            first = last;
+        for (low, &last) in (0..mesh.positions.len() as u32).zip(&end) {
+            adjacency.pair_up(mesh, low, &mut halves[first..last as usize]);
+            first = last as usize;
         }
         drop(halves);
         adjacency.find_copies(mesh);

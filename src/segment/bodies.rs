@@ -33,7 +33,7 @@ pub fn tell_apart(
     let unknown = unknown(&state);
     let doubtful = kept.beside(adjacency, &unknown);
     let wide = kept.wider_than(mesh, settings.max_grain_m, |part| size[part] >= sizes.smallest);
-    let fate: Vec<Fate> = (0..kept.len())
+    let fate: Vec<Fate> = (0..kept.count())
         .map(|part| match (size[part] >= sizes.smallest, !open[part] && !doubtful[part]) {
             (true, _) if wide[part] => Fate::Body(OVERSIZE),
             (true, true) => Fate::Body(kept.lowest[part]),

@@ -50,14 +50,14 @@ impl Components {
     }
 
     /// How many components there are.
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.lowest.len()
     }
 
     /// Size of each component in the unit of [`Sizes`]: exact where it is below the smallest grain, and not
     /// below it elsewhere.
     pub fn sizes(&self, mesh: &TileMesh, sizes: &Sizes) -> Vec<u64> {
-        let mut size = vec![0; self.len()];
+        let mut size = vec![0; self.count()];
         for (t, &part) in self.of.iter().enumerate() {
             if let Some(size) = size.get_mut(part as usize)
                 && *size < sizes.smallest
@@ -70,7 +70,7 @@ impl Components {
 
     /// Which components hold one of these triangles.
     pub fn holding(&self, triangles: &[u32]) -> Vec<bool> {
-        let mut holding = vec![false; self.len()];
+        let mut holding = vec![false; self.count()];
         for &t in triangles {
             self.mark(t, &mut holding);
         }
@@ -79,7 +79,7 @@ impl Components {
 
     /// Which components lie side by side with one of these triangles, which are of none; ascending.
     pub fn beside(&self, adjacency: &Adjacency, triangles: &[u32]) -> Vec<bool> {
-        let mut beside = vec![false; self.len()];
+        let mut beside = vec![false; self.count()];
         for &t in triangles {
             adjacency.sides(t as usize).into_iter().for_each(|t| self.mark(t, &mut beside));
         }
@@ -98,9 +98,9 @@ impl Components {
     /// Which components, of those asked for, are wider in plan than so many metres; none is for 0.
     pub fn wider_than(&self, mesh: &TileMesh, width_m: f64, asked: impl Fn(usize) -> bool) -> Vec<bool> {
         if width_m == 0.0 {
-            return vec![false; self.len()];
+            return vec![false; self.count()];
         }
-        let mut bounds = vec![PlanBox::EMPTY; self.len()];
+        let mut bounds = vec![PlanBox::EMPTY; self.count()];
         for (t, &part) in self.of.iter().enumerate() {
             if let Some(bounds) = bounds.get_mut(part as usize)
                 && asked(part as usize)

@@ -13,7 +13,7 @@ use crate::tile::TileMesh;
 pub fn fill_holes(mesh: &TileMesh, adjacency: &Adjacency, settings: &SegmentSettings, labels: &mut Labels) {
     let pockets = Components::of(adjacency, |t| labels.state[t] == State::Removed);
     let touching = contacts(mesh, labels);
-    let mut contact = vec![NONE; pockets.len()];
+    let mut contact = vec![NONE; pockets.count()];
     for (corners, &pocket) in mesh.triangles.iter().zip(&pockets.of) {
         if let Some(contact) = contact.get_mut(pocket as usize)
             && *contact & !UNSURE != SEVERAL

@@ -83,7 +83,7 @@ pub fn oversize_pieces(mesh: &TileMesh, adjacency: &Adjacency, labels: &Labels) 
     let unknown_or_outside = |t: usize| labels.state[t] == State::Unknown || outside(t);
     let mut forked: Vec<u32> = adjacency.forks().flatten().copied().collect();
     forked.sort_unstable();
-    found.pieces = vec![OversizePiece::default(); bodies.len()];
+    found.pieces = vec![OversizePiece::default(); bodies.count()];
     for t in (0..labels.label.len()).filter(|&t| inside(t)) {
         let piece = &mut found.pieces[bodies.of[t] as usize];
         if piece.triangles == 0 {
@@ -118,13 +118,13 @@ pub fn settle(mesh: &TileMesh, adjacency: &Adjacency, sizes: &Sizes, labels: &La
     let open = bodies.holding(adjacency.open());
     let at_mesh_edge = bodies.holding(adjacency.at_mesh_edge());
     let doubtful = bodies.beside(adjacency, &unknown);
-    let mut triangles = vec![0usize; bodies.len()];
+    let mut triangles = vec![0usize; bodies.count()];
     for &part in bodies.of.iter().filter(|&&part| part != NONE) {
         triangles[part as usize] += 1;
     }
     let owned = |part: usize| mesh.in_core[bodies.lowest[part] as usize];
     let closed = |part: usize| !open[part] && !doubtful[part];
-    let mut grains: Vec<Option<Segment>> = (0..bodies.len())
+    let mut grains: Vec<Option<Segment>> = (0..bodies.count())
         .map(|part| {
             let publish = owned(part) && closed(part) && size[part] >= sizes.smallest;
             let segment = |n| Segment { triangles: Vec::with_capacity(n), at_mesh_edge: at_mesh_edge[part] };

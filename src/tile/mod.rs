@@ -17,5 +17,5 @@ mod runs;
 pub use field::NormalField;
 pub use mesh::{BYTES_PER_TRIANGLE, Owned, TileMesh};
 pub use patch::{Patch, each_of};
-pub use plan::{Plan, Tile};
+pub use plan::{CoreSize, Plan, Tile};
 pub use runs::Runs;

@@ -1,0 +1,61 @@
+//! A probe: how wide grains are, so that tiles look neither too far nor too near at first.
+
+use super::grains::Recipe;
+use super::{Survey, TileError};
+use crate::geometry::PlanBox;
+use crate::index::CellBlock;
+use crate::segment::segment;
+use crate::tile::{Owned, TileMesh, each_of};
+
+/// Triangles that are looked at.
+const TRIANGLES: f64 = 2.5e5;
+/// Fewer grains say nothing.
+const LEAST_GRAINS: usize = 4;
+/// Share of grains that are not wider.
+const SHARE: f64 = 0.8;
+
+/// What a probe found.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Probe {
+    /// Width in plan that most grains do not exceed, metres; none where there were too few to say.
+    pub usual_width_m: Option<f64>,
+    /// Triangles that were segmented for it.
+    pub segmented: u64,
+}
+
+impl Survey<'_> {
+    /// Segments a small block in the middle tile, if there are several tiles.
+    ///
+    /// # Errors
+    /// The index cannot be read.
+    pub fn probe(&self, recipe: &Recipe) -> Result<Probe, TileError> {
+        if self.plan.tiles.len() < 2 {
+            return Ok(Probe::default());
+        }
+        let core = self.core(self.plan.tiles.len() / 2);
+        let per_cell = self.index.scale.triangles as f64 / self.index.triangles.occupied_cells().max(1) as f64;
+        let side = (TRIANGLES / per_cell).sqrt() as u32;
+        let middle = |r: &std::ops::Range<u32>, n: u32| {
+            let first = ((r.start + r.end) / 2).saturating_sub(side / 2);
+            first..first.saturating_add(side).min(n)
+        };
+        let grid = &self.index.grid;
+        let block = CellBlock { columns: middle(&core.columns, grid.columns), rows: middle(&core.rows, grid.rows) };
+        let mesh = TileMesh::load(self.index, Owned::Cells(&block), &block)?;
+        let mut divergence = Vec::with_capacity(mesh.positions.len());
+        each_of(recipe.divergence, &mesh.vertex_runs, |d| divergence.push(d))?;
+        let found = segment(&mesh, &divergence, &self.index.scale, recipe.settings, &mut |_, _| {});
+        let width_m = |triangles: &[u32]| {
+            let mut bounds = PlanBox::EMPTY;
+            triangles.iter().flat_map(|&t| mesh.corners(t)).for_each(|c| bounds.include(c));
+            bounds.width_m()
+        };
+        let mut widths_m: Vec<f64> = found.grains.iter().map(|g| width_m(&g.triangles)).collect();
+        widths_m.sort_unstable_by(f64::total_cmp);
+        let usual = widths_m.get((SHARE * widths_m.len() as f64) as usize).copied();
+        Ok(Probe {
+            usual_width_m: usual.filter(|_| widths_m.len() >= LEAST_GRAINS),
+            segmented: mesh.triangles.len() as u64,
+        })
+    }
+}
