@@ -167,6 +167,7 @@ fn a_full_disk_is_called_so_and_what_was_recorded_stays() {
 
 #[test]
 fn a_column_on_a_full_disk_is_called_so() {
+    let _alone = alone();
     let Some(disk) = SmallDisk::new(64) else {
         println!("skipped: this user cannot mount a small disk");
         return;
