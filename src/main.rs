@@ -5,7 +5,7 @@ use gravelometer::cli::{Cli, Command, DemoArgs, InspectArgs, Log, RunArgs, Setti
 use gravelometer::cli::{cost_table, report_error, reporter};
 use gravelometer::demo::{Demonstration, demonstrate};
 use gravelometer::error::{Error, ExitCode};
-use gravelometer::pipeline::{Control, Interrupted};
+use gravelometer::pipeline::{Cancelled, Control, Interrupted};
 use gravelometer::progress::Progress;
 use gravelometer::run::{Job, run};
 use gravelometer::settings::InputSettings;
@@ -34,8 +34,10 @@ fn control(progress: &dyn Progress, log: Log) -> Control {
     let control = Control::default();
     let flag = control.clone();
     let set = ctrlc::set_handler(move || {
-        if flag.cancel() {
-            std::process::exit(ExitCode::Interrupted as i32);
+        match flag.cancel() {
+            Cancelled::Work => {}
+            Cancelled::Before => std::process::exit(ExitCode::Interrupted as i32),
+            Cancelled::TooLate => return,
         }
         // What is kept on disk is whole at any moment, so a tile in flight need not be waited for.
         std::thread::sleep(GRACE);
@@ -73,7 +75,10 @@ fn run_command(args: &RunArgs) -> Result<ExitCode, Error> {
     if outcome.lost.is_empty() {
         return Ok(ExitCode::Done);
     }
-    progress.warn(&format!("{} tiles were lost; run.json names them", outcome.lost.len()));
+    progress.warn(&format!(
+        "{} tiles were lost; run.json names them, and the same command with --resume tries them again",
+        outcome.lost.len()
+    ));
     Ok(ExitCode::DoneWithLosses)
 }
 

@@ -10,13 +10,13 @@ use crate::open::Reach;
 use crate::passes::{Recipe, Survey};
 use crate::pipeline::{Budget, Control, Crew, LostJob, memory_there_bytes};
 use crate::progress::{Progress, Unit};
-use crate::resume::{Curvature, WORK, WorkFolder};
+use crate::resume::{WORK, WorkFolder};
 use crate::segment::smallest_grain_area_m2;
 use crate::settings::Settings;
 use crate::statistics::RasterGrid;
 use crate::stitch::{Catalogue, TileReport, stitch};
 use crate::tile::Plan;
-use crate::write::{OutputFolder, Results, WholeMesh, WriteError, write_all};
+use crate::write::{OutputFolder, Results, WholeMesh, WriteError, write_unnamed};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -67,9 +67,11 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let progress: &dyn Progress = &meter;
     let settings = &job.settings;
     settings.check()?;
-    let folder = OutputFolder::create(&job.out, job.force || job.resume, &[WORK])?;
+    // Where there is nothing to resume, results that are there are not those of an interrupted run.
+    let resumed = job.resume && WorkFolder::holds_run(job.work.as_deref(), &job.out);
+    let folder = OutputFolder::create(&job.out, job.force || resumed, &[WORK])?;
     folder.spare(&job.inputs)?;
-    let work = WorkFolder::open(job.work.as_deref(), &job.out)?;
+    let mut work = WorkFolder::open(job.work.as_deref(), &job.out)?;
     let (pool, memory) = (pool(settings)?, memory_bytes(settings));
     let threads = pool.current_num_threads();
 
@@ -78,7 +80,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     control.check()?;
     let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
     warnings.iter().for_each(|w| progress.warn(w));
-    work.begin(&reach, settings, job.resume)?;
+    let mut findings = work.begin(&reach, settings, job.resume)?;
 
     // index
     let room = forecast::room(&reach, memory)?;
@@ -97,7 +99,6 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     // plan
     let sizes = forecast::core_sizes(&index, settings, threads, room.bytes);
     let mut curvature = work.curvature(&reach, &index, settings)?;
-    let mut findings = work.findings(&reach, settings)?;
     let vertex_plan = Plan::new(&index, curvature.core(sizes.curvature)?);
     let plan = Plan::new(&index, findings.core(sizes.grains)?);
     let tiles_bytes = forecast::tiles_bytes(&Survey { index: &index, plan: &plan }, settings, threads, room.bytes)?;
@@ -118,16 +119,17 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let stencil = Stencil::new(index.scale.spacing_m, index.scale.mean_triangle_area_m2, &settings.curvature);
     let survey = Survey { index: &index, plan: &vertex_plan };
     let jobs = curvature.missing(&index, &vertex_plan)?;
-    let Curvature { divergence, tiles } = &mut curvature;
-    let lost = survey.divergence(&crew, &jobs, &stencil, divergence, progress, |job, values| {
-        tiles.done(vertex_plan.tiles[job].id, values)
+    let lost = survey.divergence(&crew, &jobs, &stencil, progress, |job, runs, values| {
+        curvature.add(vertex_plan.tiles[job].id, runs, values)
     })?;
     none_lost("curvature", lost)?;
+    curvature.sync()?;
 
     // tile by tile: segment and measure
     let outline_step_m = reach.frame().outline_step_m();
     let wanted = Wanted { outline_step_m, triangle_ids: settings.output.labelled_mesh };
-    let recipe = Recipe { settings: &settings.segment, divergence, wanted, usual_width_m: None };
+    let recipe =
+        Recipe { settings: &settings.segment, divergence: curvature.divergence(), wanted, usual_width_m: None };
     let survey = Survey { index: &index, plan: &plan };
     let probe = crew.pool.install(|| survey.probe(&recipe))?;
     let recipe = Recipe { usual_width_m: probe.usual_width_m, ..recipe };
@@ -136,6 +138,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
         progress.note(&format!("{} of {} tiles are done already", plan.tiles.len() - jobs.len(), plan.tiles.len()));
     }
     let lost = survey.grains(&crew, &jobs, &recipe, progress, |_, finding| findings.add(&finding))?;
+    findings.sync()?;
     let tile = |lost: &LostJob| plan.tiles[lost.job].id;
     lost.iter().for_each(|lost| progress.warn(&format!("tile {} is lost: {}", tile(lost), lost.message)));
 
@@ -161,7 +164,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
         costs: &|| serde_json::json!(meter.costs()),
         mesh: settings.output.labelled_mesh.then_some(&mesh),
     };
-    let files = write(&folder, &results, progress)?;
+    let files = write(&folder, &results, progress, control)?;
     if lost.is_empty() {
         drop((index, curvature, findings));
         work.finish();
@@ -237,12 +240,19 @@ fn none_lost(pass: &'static str, lost: Vec<LostJob>) -> Result<(), Error> {
     }
 }
 
-fn write(folder: &OutputFolder, results: &Results, progress: &dyn Progress) -> Result<Vec<PathBuf>, Error> {
+fn write(
+    folder: &OutputFolder,
+    results: &Results,
+    progress: &dyn Progress,
+    control: &Control,
+) -> Result<Vec<PathBuf>, Error> {
     let files = crate::write::OUTPUTS.len() - usize::from(results.mesh.is_none());
     progress.begin("write", files as u64, Unit::Files);
-    let written = write_all(folder, results, &|_| progress.advance(1));
+    let written = write_unnamed(folder, results, &|_| progress.advance(1));
     progress.end();
-    Ok(written?)
+    let written = written?;
+    control.commit()?;
+    Ok(folder.publish(written)?)
 }
 
 fn segmented_per_triangle(tiles: &[TileReport], probed: u64) -> f64 {

@@ -22,6 +22,7 @@ use gravelometer::stitch::{Catalogue, TileReport, stitch};
 use gravelometer::store::{Column, Shelf};
 use gravelometer::tile::{CoreSize, Owned, Plan, TileMesh, each_of};
 use std::convert::Infallible;
+use std::ops::Range;
 use support::bed::{Rng, bed, shuffled};
 
 const WANTED: Wanted = Wanted { outline_step_m: 1.0 / 1_048_576.0, triangle_ids: true };
@@ -60,8 +61,12 @@ fn worked(surface: &MemorySurface, tiling: Tiling) -> Worked<'_> {
     let divergence = Shelf::new(folder.path()).unwrap().create("divergence", index.scale.vertices).unwrap();
     let jobs: Vec<usize> = (0..plan.tiles.len()).collect();
     let survey = Survey { index: &index, plan: &plan };
-    let done = |_, _: &[f64]| Ok::<_, Infallible>(());
-    let lost = survey.divergence(&crew, &jobs, &stencil, &divergence, &Silent, done).unwrap();
+    let keep = |_, runs: &[Range<u64>], values: &[f64]| {
+        let mut values = values.iter().copied();
+        runs.iter()
+            .try_for_each(|run| divergence.write(run.start, values.by_ref().take((run.end - run.start) as usize)))
+    };
+    let lost = survey.divergence(&crew, &jobs, &stencil, &Silent, keep).unwrap();
     assert!(lost.is_empty(), "{lost:?}");
     Worked { surface, index, divergence }
 }

@@ -6,6 +6,7 @@ mod support;
 use gravelometer::store::{Column, KILL_AT, Ledger, StoreError, write_atomically};
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use support::small_disk::SmallDisk;
 
 /// Where the child works: this binary again, running `keep_records` only.
@@ -72,10 +73,23 @@ fn recorded(folder: &Path) -> u64 {
     found
 }
 
+/// Held by tests that start children: for a moment a child shares what is open here, locks as well.
+fn alone() -> MutexGuard<'static, ()> {
+    static ALONE: Mutex<()> = Mutex::new(());
+    ALONE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Places in the commit of a record or of a small file.
+fn record_points() -> impl Iterator<Item = &'static str> {
+    let ours = |name: &&str| name.starts_with("ledger.") || name.starts_with("atomic_file.");
+    gravelometer::store::FAIL_POINTS.into_iter().filter(ours)
+}
+
 #[cfg(debug_assertions)]
 #[test]
 fn a_kill_at_every_commit_point_leaves_whole_records_and_the_next_run_completes_them() {
-    for name in gravelometer::store::FAIL_POINTS {
+    let _alone = alone();
+    for name in record_points() {
         for visit in 1..=RECORDS {
             let folder = tempfile::tempdir().unwrap();
             let kill_at = format!("{name}:{visit}");
@@ -96,7 +110,8 @@ fn a_kill_at_every_commit_point_leaves_whole_records_and_the_next_run_completes_
 #[cfg(not(debug_assertions))]
 #[test]
 fn a_release_build_knows_no_fail_points() {
-    for name in gravelometer::store::FAIL_POINTS {
+    let _alone = alone();
+    for name in record_points() {
         let folder = tempfile::tempdir().unwrap();
         assert!(child(folder.path(), name), "{name}");
         assert_eq!(recorded(folder.path()), RECORDS);
@@ -106,6 +121,7 @@ fn a_release_build_knows_no_fail_points() {
 #[cfg(unix)]
 #[test]
 fn a_process_killed_from_outside_at_any_time_leaves_whole_records() {
+    let _alone = alone();
     for delay_us in (0..40u64).map(|i| i * i * 25) {
         let folder = tempfile::tempdir().unwrap();
         let mut running = Command::new(std::env::current_exe().unwrap())
@@ -126,6 +142,7 @@ fn a_process_killed_from_outside_at_any_time_leaves_whole_records() {
 
 #[test]
 fn a_full_disk_is_called_so_and_what_was_recorded_stays() {
+    let _alone = alone();
     let mut refused = 0;
     for kibibytes in (8..120).step_by(8) {
         let Some(disk) = SmallDisk::new(kibibytes) else {
@@ -150,6 +167,7 @@ fn a_full_disk_is_called_so_and_what_was_recorded_stays() {
 
 #[test]
 fn a_column_on_a_full_disk_is_called_so() {
+    let _alone = alone();
     let Some(disk) = SmallDisk::new(64) else {
         println!("skipped: this user cannot mount a small disk");
         return;

@@ -75,6 +75,13 @@ impl<const N: usize> Numbers<N> {
         matches!(self, Numbers::Wide(_))
     }
 
+    pub(super) fn checksum(&self) -> Result<u64, StoreError> {
+        match self {
+            Numbers::Narrow(column) => column.checksum(),
+            Numbers::Wide(column) => column.checksum(),
+        }
+    }
+
     pub(super) fn sync(&self) -> Result<(), StoreError> {
         match self {
             Numbers::Narrow(column) => column.sync(),

@@ -3,15 +3,18 @@
 use super::cells::{CellGrid, CellStarts};
 use super::identity::Numbers;
 use super::{COLORS, CORNERS, Columns, Index, POSITIONS, Scale, TRIANGLE_INPUTS, VALENCES, VERTEX_INPUTS};
-use crate::store::{Column, Shelf, StoreError};
+use crate::store::{Column, Shelf, StoreError, fail_point};
 use serde::{Deserialize, Serialize};
+use std::hash::Hasher;
+use std::path::Path;
+use twox_hash::XxHash3_64;
 
 const MANIFEST: &str = "manifest";
 const VERTEX_STARTS: &str = "vertex_starts";
 const TRIANGLE_STARTS: &str = "triangle_starts";
 
 /// Must change when the meaning of a column does.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 #[derive(Serialize, Deserialize)]
 struct Manifest {
@@ -21,6 +24,8 @@ struct Manifest {
     scale: Scale,
     wide: bool,
     full_color: Option<f64>,
+    /// Of the columns, in the order of [`Index::checksums`].
+    checksums: Vec<u64>,
 }
 
 impl Index {
@@ -51,13 +56,16 @@ impl Index {
             scale: self.scale,
             wide: columns.corners.is_wide(),
             full_color: columns.colors.as_ref().map(|(full, _)| *full),
+            checksums: self.checksums()?,
         };
         // Plain numbers and a text can always be put into bytes.
         let bytes = postcard::to_extend(&manifest, Vec::new()).unwrap_or_default();
+        fail_point("index.before_manifest");
         shelf.put(MANIFEST, &bytes)
     }
 
-    /// Opens the index on a shelf, if there is a whole one of this identity.
+    /// Opens the index on a shelf, if there is a whole one of this identity. All of it is read once and held
+    /// against its checksums: a damaged one would give other grains.
     pub fn open(shelf: &Shelf, identity: &str) -> Option<Index> {
         let bytes = shelf.get(MANIFEST)?;
         let manifest: Manifest = postcard::from_bytes(&bytes).ok()?;
@@ -71,7 +79,7 @@ impl Index {
             shelf.open::<u64>(name, cells).ok()?.read(0..cells, &mut starts).ok()?;
             Some(CellStarts::new(starts))
         };
-        Some(Index {
+        let index = Index {
             triangles: starts(TRIANGLE_STARTS)?,
             vertices: starts(VERTEX_STARTS)?,
             grid: manifest.grid,
@@ -87,7 +95,33 @@ impl Index {
                     None => None,
                 },
             },
-        })
+        };
+        (index.checksums().ok()? == manifest.checksums).then_some(index)
+    }
+
+    fn checksums(&self) -> Result<Vec<u64>, StoreError> {
+        let columns = &self.columns;
+        let mut found = vec![
+            columns.positions.checksum()?,
+            columns.valences.checksum()?,
+            columns.corners.checksum()?,
+            columns.vertex_inputs.checksum()?,
+            columns.triangle_inputs.checksum()?,
+        ];
+        if let Some((_, colors)) = &columns.colors {
+            found.push(colors.checksum()?);
+        }
+        for cells in [&self.triangles, &self.vertices] {
+            let mut hash = XxHash3_64::new();
+            cells.starts().iter().for_each(|start| hash.write(&start.to_le_bytes()));
+            found.push(hash.finish());
+        }
+        Ok(found)
+    }
+
+    /// Whether a folder holds an index that was kept, of whatever survey.
+    pub fn is_kept_in(folder: &Path) -> bool {
+        folder.join(MANIFEST).exists()
     }
 
     /// Makes sure that nobody opens the index on a shelf any more: it is about to be made anew.

@@ -9,7 +9,7 @@ use crate::progress::{Progress, Unit};
 use crate::segment::{OversizePiece, Settled, segment};
 use crate::settings::SegmentSettings;
 use crate::stitch::{TileFinding, TileReport};
-use crate::store::{Column, StoreError};
+use crate::store::{Column, StoreError, panic_point};
 use crate::tile::{Owned, TileMesh, each_of};
 use rayon::prelude::*;
 
@@ -123,6 +123,7 @@ impl Survey<'_> {
     }
 
     fn tile(&self, job: usize, recipe: &Recipe, reservation: &mut Reservation) -> Result<TileFinding, TileError> {
+        panic_point("grains", self.plan.tiles[job].id);
         let core = self.core(job);
         let first = self.first_block(job, recipe);
         let mut found = Found::default();

@@ -5,7 +5,6 @@ use crate::curvature::{Stencil, divergence, nearest_centroid_m};
 use crate::geometry::{DVec3, ExactSum};
 use crate::pipeline::{Crew, Interrupted, LostJob, Reservation, Stages, Stopped, over_jobs};
 use crate::progress::{Progress, Unit};
-use crate::store::Column;
 use crate::tile::NormalField;
 use std::convert::Infallible;
 use std::ops::Range;
@@ -50,39 +49,29 @@ impl Survey<'_> {
         Ok((sum.value() / self.index.scale.vertices.max(1) as f64, lost))
     }
 
-    /// Divergence of the normal field at every vertex, 1/m, into `column`, for the tiles of `jobs`. `done` hears
-    /// of every tile, in their order, when its values are written, and gets them.
+    /// Divergence of the normal field at every vertex, 1/m, for the tiles of `jobs`. `collect` gets from every
+    /// tile, in their order, its runs of vertices, and behind one another the values of all.
     ///
     /// # Errors
-    /// When interrupted, or when `done` fails.
+    /// When interrupted, or when `collect` fails, as on a full disk.
     pub fn divergence<C>(
         &self,
         crew: &Crew,
         jobs: &[usize],
         stencil: &Stencil,
-        column: &Column<f64>,
         progress: &dyn Progress,
-        mut done: impl FnMut(usize, &[f64]) -> Result<(), C>,
+        mut collect: impl FnMut(usize, &[Range<u64>], &[f64]) -> Result<(), C>,
     ) -> Result<Vec<LostJob>, Stopped<C>> {
         let values = |field: &NormalField, points: &[DVec3]| divergence(field, points, stencil);
         let stages = Stages {
             footprint_bytes: |job| self.field_bytes(job, stencil.reach_m()),
-            work: |job, reservation: &mut Reservation| {
-                let core = self.of_core(job, stencil.reach_m(), &values, reservation)?;
-                let mut rest = &core.values[..];
-                for run in &core.runs {
-                    let (of_run, after) = rest.split_at((run.end - run.start) as usize);
-                    column.write(run.start, of_run.iter().copied())?;
-                    rest = after;
-                }
-                Ok::<_, TileError>(core.values)
-            },
+            work: |job, reservation: &mut Reservation| self.of_core(job, stencil.reach_m(), &values, reservation),
         };
         let vertices = |job: usize| self.index.vertices.count(&self.index.grid, self.core(job));
         progress.begin("curvature", jobs.iter().map(|&job| vertices(job)).sum(), Unit::Vertices);
-        let lost = over_jobs(crew, jobs, &stages, |job, values| {
-            progress.advance(values.len() as u64);
-            done(job, &values)
+        let lost = over_jobs(crew, jobs, &stages, |job, core: CoreValues| {
+            progress.advance(core.values.len() as u64);
+            collect(job, &core.runs, &core.values)
         });
         progress.end();
         lost

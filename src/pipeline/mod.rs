@@ -14,7 +14,7 @@ mod control;
 mod machine;
 
 pub use budget::{Budget, OverBudget, Reservation};
-pub use control::{Control, Interrupted};
+pub use control::{Cancelled, Control, Interrupted};
 pub use machine::{cpu_seconds, memory_there_bytes, peak_memory_bytes};
 
 use crossbeam_channel::{Receiver, Sender, bounded};

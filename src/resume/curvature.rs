@@ -2,9 +2,10 @@
 
 use super::recorded_core;
 use crate::index::Index;
-use crate::store::{Column, Ledger, Shelf, StoreError};
+use crate::store::{Column, Ledger, Shelf, StoreError, fail_point};
 use crate::tile::{CoreSize, Plan};
 use std::hash::Hasher;
+use std::ops::Range;
 use twox_hash::XxHash3_64;
 
 const LEDGER: &str = "tiles";
@@ -17,15 +18,9 @@ const TILES: u64 = 2;
 /// What is known of a survey's curvature.
 #[derive(Debug)]
 pub struct Curvature {
-    /// Divergence by vertex, 1/m; only of tiles that are done.
-    pub divergence: Column<f64>,
-    /// Which these are.
-    pub tiles: TilesDone,
+    divergence: Column<f64>,
+    tiles: Ledger,
 }
-
-/// Which tiles have their divergence.
-#[derive(Debug)]
-pub struct TilesDone(Ledger);
 
 impl Curvature {
     pub(super) fn open(shelf: &Shelf, identity: &str, index: &Index) -> Result<Curvature, StoreError> {
@@ -40,7 +35,7 @@ impl Curvature {
                 shelf.create(DIVERGENCE, index.scale.vertices)?
             }
         };
-        Ok(Curvature { divergence, tiles: TilesDone(ledger) })
+        Ok(Curvature { divergence, tiles: ledger })
     }
 
     /// The size of the cores whose records are here; otherwise `size`, which it is from now on.
@@ -48,7 +43,7 @@ impl Curvature {
     /// # Errors
     /// The disk says no.
     pub fn core(&mut self, size: CoreSize) -> Result<CoreSize, StoreError> {
-        recorded_core(&mut self.tiles.0, SIZE, size)
+        recorded_core(&mut self.tiles, SIZE, size)
     }
 
     /// The spacing, metres: the recorded one, or the one that `measure` finds, which is recorded.
@@ -56,14 +51,14 @@ impl Curvature {
     /// # Errors
     /// Those of `measure`, and the disk's.
     pub fn spacing_m<E: From<StoreError>>(&mut self, measure: impl FnOnce() -> Result<f64, E>) -> Result<f64, E> {
-        if let Some(position) = self.tiles.0.position(SPACING) {
-            let record = self.tiles.0.read(position)?;
+        if let Some(position) = self.tiles.position(SPACING) {
+            let record = self.tiles.read(position)?;
             if let Ok(bytes) = record.payload.try_into() {
                 return Ok(f64::from_le_bytes(bytes));
             }
         }
         let found = measure()?;
-        self.tiles.0.append(SPACING, &found.to_le_bytes())?;
+        self.tiles.append(SPACING, &found.to_le_bytes())?;
         Ok(found)
     }
 
@@ -75,8 +70,8 @@ impl Curvature {
     pub fn missing(&self, index: &Index, plan: &Plan) -> Result<Vec<usize>, StoreError> {
         let mut missing = Vec::new();
         for (job, tile) in plan.tiles.iter().enumerate() {
-            let recorded = match self.tiles.0.position(TILES + tile.id) {
-                Some(position) => Some(self.tiles.0.read(position)?.payload),
+            let recorded = match self.tiles.position(TILES + tile.id) {
+                Some(position) => Some(self.tiles.read(position)?.payload),
                 None => None,
             };
             let whole = match recorded {
@@ -95,15 +90,34 @@ impl Curvature {
         }
         Ok(missing)
     }
-}
 
-impl TilesDone {
-    /// Records that the values of a tile, given again here, are written.
+    /// Keeps the values of a tile: its runs of vertices, and behind one another the values of all.
     ///
     /// # Errors
     /// The disk says no.
-    pub fn done(&mut self, tile: u64, values: &[f64]) -> Result<(), StoreError> {
-        self.0.append(TILES + tile, &checksum(values)).map(|_| ())
+    pub fn add(&mut self, tile: u64, runs: &[Range<u64>], values: &[f64]) -> Result<(), StoreError> {
+        let mut rest = values;
+        for run in runs {
+            let (of_run, after) = rest.split_at((run.end - run.start) as usize);
+            self.divergence.write(run.start, of_run.iter().copied())?;
+            rest = after;
+        }
+        fail_point("curvature.before_record");
+        self.tiles.append(TILES + tile, &checksum(values)).map(|_| ())
+    }
+
+    /// Flushes all of it to the disk.
+    ///
+    /// # Errors
+    /// The disk says no.
+    pub fn sync(&mut self) -> Result<(), StoreError> {
+        self.divergence.sync()?;
+        self.tiles.sync()
+    }
+
+    /// Divergence by vertex, 1/m; only of tiles that are done.
+    pub fn divergence(&self) -> &Column<f64> {
+        &self.divergence
     }
 }
 

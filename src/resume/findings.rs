@@ -18,7 +18,7 @@ pub struct Findings {
 
 impl Findings {
     pub(super) fn open(shelf: &Shelf, name: &str, identity: &str) -> Result<Findings, StoreError> {
-        Ok(Findings { ledger: shelf.ledger(name, identity)?.0 })
+        Ok(Findings { ledger: shelf.ledger_of(name, identity)?.0 })
     }
 
     /// The size of the cores whose records are here; otherwise `size`, which it is from now on.
@@ -42,6 +42,14 @@ impl Findings {
     pub fn add(&mut self, finding: &TileFinding) -> Result<(), Error> {
         self.ledger.append(TILES + finding.report.tile, &finding.to_record()?)?;
         Ok(())
+    }
+
+    /// Flushes them to the disk.
+    ///
+    /// # Errors
+    /// The disk says no.
+    pub fn sync(&mut self) -> Result<(), StoreError> {
+        self.ledger.sync()
     }
 
     /// All findings, in the order of the plan.

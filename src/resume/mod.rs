@@ -3,13 +3,14 @@
 //!
 //! | in the folder | holds | depends on |
 //! |---|---|---|
-//! | `run` | identity of the run | inputs and every setting that changes a result |
+//! | `gravelometer-work.lock` | nothing: it marks the folder as ours, and the run that uses it locks it | |
 //! | `index/` | the index | the inputs |
 //! | `curvature/` | spacing and divergence, tile by tile | the inputs, `[curvature]` |
-//! | `grains` | findings, tile by tile | all of it |
+//! | `grains` | findings, tile by tile | the inputs and every setting that changes a result |
 //!
 //! Each part carries the identity of what it depends on. A part that does not fit is made anew, unless the run
-//! is to be resumed: then a change is refused by name.
+//! is to be resumed: then a change is refused by name. A folder with other files in it and without the mark is
+//! never used, so nothing in it can be lost.
 
 mod curvature;
 mod findings;
@@ -23,15 +24,15 @@ use crate::error::Error;
 use crate::index::{Index, IndexError};
 use crate::open::Reach;
 use crate::settings::Settings;
-use crate::store::{Ledger, Shelf, StoreError};
+use crate::store::{Ledger, Shelf, StoreError, fail_point};
 use crate::tile::CoreSize;
 use identity::Identity;
-use std::fs::{File, TryLockError};
+use std::fs::File;
 use std::path::{Path, PathBuf};
 
 /// Name of the work folder within OUT.
 pub const WORK: &str = "gravelometer-work";
-const RUN: &str = "run";
+const MARK: &str = "gravelometer-work.lock";
 const INDEX: &str = "index";
 const CURVATURE: &str = "curvature";
 const GRAINS: &str = "grains";
@@ -42,6 +43,8 @@ pub struct WorkFolder {
     shelf: Shelf,
     /// Whether it stays when the run is done.
     stays: bool,
+    /// Whether what is in it belongs to this run, which may then clear it up.
+    ours: bool,
     /// Held while the folder is: no other run can use it.
     _lock: File,
 }
@@ -55,6 +58,29 @@ pub enum ResumeError {
     Busy {
         /// The folder.
         path: PathBuf,
+    },
+    /// Results and what is kept for later runs would lie in one folder.
+    #[error("{}: is the folder of the results, which cannot be the work folder as well\nhelp: leave out --work-dir, or name a folder of its own, such as {}", path.display(), path.join(WORK).display())]
+    OutItself {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// Something else has the name of the work folder.
+    #[error("{}: is not a folder, so nothing can be kept in it\nhelp: name a folder with --work-dir", path.display())]
+    NotAFolder {
+        /// The path.
+        path: PathBuf,
+    },
+    /// The folder was not made for this and is not empty.
+    #[error(
+        "{}: holds other files, such as {found:?}, so it is not used as work folder\nhelp: name a new or empty folder with --work-dir",
+        path.display()
+    )]
+    Foreign {
+        /// The folder.
+        path: PathBuf,
+        /// Something in it.
+        found: String,
     },
     /// The interrupted run was another one.
     #[error(
@@ -71,23 +97,36 @@ pub enum ResumeError {
 }
 
 impl WorkFolder {
-    /// Makes and locks the work folder: the one that was named, which stays, or `OUT/gravelometer-work`, which goes when the
-    /// run is done.
+    /// Makes and locks the work folder: the one that was named, which stays, or `OUT/gravelometer-work`, which goes
+    /// when the run is done.
     ///
     /// # Errors
-    /// It cannot be made, or another run uses it.
+    /// It cannot be made, or another run uses it, or it is somebody else's.
     pub fn open(named: Option<&Path>, out: &Path) -> Result<WorkFolder, Error> {
-        let shelf = Shelf::new(&named.map_or_else(|| out.join(WORK), Path::to_owned))?;
-        let path = shelf.folder().to_owned();
-        let lock = File::open(&path).map_err(|source| StoreError::Io {
-            path: path.clone(),
-            action: "open the work folder",
-            source,
-        })?;
-        if let Err(TryLockError::WouldBlock) = lock.try_lock() {
-            return Err(ResumeError::Busy { path }.into());
+        let path = place(named, out);
+        if out.canonicalize().is_ok_and(|out| path.canonicalize().is_ok_and(|path| path == out)) {
+            return Err(ResumeError::OutItself { path }.into());
         }
-        Ok(WorkFolder { shelf, stays: named.is_some(), _lock: lock })
+        let made = !path.exists();
+        if !made && !path.is_dir() {
+            return Err(ResumeError::NotAFolder { path }.into());
+        }
+        let shelf = Shelf::new(&path)?;
+        if !shelf.has(MARK)
+            && let Some(found) = shelf.anything()?
+        {
+            return Err(ResumeError::Foreign { path, found }.into());
+        }
+        match shelf.lock(MARK)? {
+            Some(lock) => Ok(WorkFolder { shelf, stays: named.is_some(), ours: made, _lock: lock }),
+            None => Err(ResumeError::Busy { path }.into()),
+        }
+    }
+
+    /// Whether there is a run that can be resumed.
+    pub fn holds_run(named: Option<&Path>, out: &Path) -> bool {
+        let path = place(named, out);
+        path.join(MARK).exists() && path.join(GRAINS).exists()
     }
 
     /// The folder.
@@ -100,24 +139,29 @@ impl WorkFolder {
         self.shelf.free_bytes()
     }
 
-    /// Says which run this is. With `resume`, an earlier one there must be the same.
+    /// Says which run this is, and gives the findings of tiles, as far as they are there. With `resume`, an earlier
+    /// run there must be the same; otherwise its findings go.
     ///
     /// # Errors
     /// What is resumed was another run, or the disk says no.
-    pub fn begin(&self, reach: &Reach, settings: &Settings, resume: bool) -> Result<(), Error> {
-        let identity = of_grains(reach, settings);
-        match self.shelf.get(RUN).map(|bytes| String::from_utf8_lossy(&bytes).into_owned()) {
-            Some(earlier) if resume => {
-                let changes = identity.changes_since(&earlier);
-                if !changes.is_empty() {
-                    return Err(ResumeError::Changed { path: self.path().to_owned(), changes }.into());
-                }
-                return Ok(());
-            }
+    pub fn begin(&mut self, reach: &Reach, settings: &Settings, resume: bool) -> Result<Findings, Error> {
+        let outline_step_m = reach.frame().outline_step_m();
+        let identity = Identity::of_survey(reach).and_curvature(settings).and_grains(settings, outline_step_m);
+        if !resume {
             // What is not resumed must not be found later.
-            _ => self.shelf.remove(GRAINS),
+            self.shelf.remove(GRAINS);
         }
-        Ok(self.shelf.put(RUN, identity.text().as_bytes())?)
+        match Findings::open(&self.shelf, GRAINS, &identity.text()) {
+            Ok(findings) => {
+                self.ours = true;
+                Ok(findings)
+            }
+            Err(StoreError::OtherIdentity { recorded, .. }) => {
+                let changes = identity.changes_since(&recorded);
+                Err(ResumeError::Changed { path: self.path().to_owned(), changes }.into())
+            }
+            Err(error) => Err(error.into()),
+        }
     }
 
     /// The index of the survey, if it is there.
@@ -153,33 +197,51 @@ impl WorkFolder {
         Ok(Curvature::open(&self.shelf.inner(CURVATURE)?, &identity, index)?)
     }
 
-    /// Findings of tiles, as far as they are there.
-    ///
-    /// # Errors
-    /// The disk says no.
-    pub fn findings(&self, reach: &Reach, settings: &Settings) -> Result<Findings, Error> {
-        Ok(Findings::open(&self.shelf, GRAINS, &of_grains(reach, settings).text())?)
+    /// Clears up after a run that is done: all of it, or, if it was named, what no later run can use.
+    pub fn finish(mut self) {
+        fail_point("work_folder.before_removal");
+        if !self.stays {
+            self.remove(CURVATURE);
+            self.remove(INDEX);
+        }
+        fail_point("work_folder.before_last_removal");
+        // Last: as long as it is there, the run can be resumed.
+        self.shelf.remove(GRAINS);
+        if !self.stays {
+            self.remove_itself();
+        }
+        self.ours = false;
     }
 
-    /// Clears up after a run that is done: all of it, or, if it was named, what no later run can use.
-    pub fn finish(self) {
-        self.shelf.remove(GRAINS);
-        self.shelf.remove(RUN);
-        if !self.stays {
-            // Nothing is lost if some of it stays; what others put there does.
-            let _ = std::fs::remove_dir_all(self.shelf.path(INDEX));
-            let _ = std::fs::remove_dir_all(self.shelf.path(CURVATURE));
-        }
+    /// Removes a part that nobody needs. Nothing is lost if some of it stays.
+    fn remove(&self, part: &str) {
+        let _ = std::fs::remove_dir_all(self.shelf.path(part));
+    }
+
+    /// Removes the folder, unless others put something there.
+    fn remove_itself(&self) {
+        self.shelf.remove(MARK);
+        let _ = std::fs::remove_dir(self.shelf.folder());
     }
 }
 
 impl Drop for WorkFolder {
+    /// A run that ends before it has kept anything leaves nothing behind. Curvature is only there when an index
+    /// was, and outlives one that is made again.
     fn drop(&mut self) {
+        if !self.ours || Index::is_kept_in(&self.shelf.path(INDEX)) || self.shelf.has(CURVATURE) {
+            return;
+        }
+        self.remove(INDEX);
+        self.shelf.remove(GRAINS);
         if !self.stays {
-            // Only an empty folder can be removed: a run that kept nothing leaves no trace.
-            let _ = std::fs::remove_dir(self.shelf.folder());
+            self.remove_itself();
         }
     }
+}
+
+fn place(named: Option<&Path>, out: &Path) -> PathBuf {
+    named.map_or_else(|| out.join(WORK), Path::to_owned)
 }
 
 /// The size of cores that a ledger has under `key`, or `size`, which is then recorded: tiles that are done are
@@ -193,9 +255,4 @@ fn recorded_core(ledger: &mut Ledger, key: u64, size: CoreSize) -> Result<CoreSi
     }
     ledger.append(key, &[size.columns.to_le_bytes(), size.rows.to_le_bytes()].concat())?;
     Ok(size)
-}
-
-fn of_grains(reach: &Reach, settings: &Settings) -> Identity {
-    let outline_step_m = reach.frame().outline_step_m();
-    Identity::of_survey(reach).and_curvature(settings).and_grains(settings, outline_step_m)
 }

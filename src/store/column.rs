@@ -6,9 +6,11 @@
 use super::StoreError;
 use super::positioned::Positioned;
 use std::fs::OpenOptions;
+use std::hash::Hasher;
 use std::marker::PhantomData;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use twox_hash::XxHash3_64;
 
 /// What a column may hold.
 pub trait Element: Copy + Send + Sync {
@@ -149,6 +151,23 @@ impl<T: Element> Column<T> {
             }
         }
         write(&bytes[..filled], at)
+    }
+
+    /// XXH3-64 of all its bytes.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn checksum(&self) -> Result<u64, StoreError> {
+        let (mut hash, mut at) = (XxHash3_64::new(), 0);
+        let end = self.len * T::BYTES as u64;
+        let mut bytes = vec![0; PIECE_BYTES.min(end as usize)];
+        while at < end {
+            let part = &mut bytes[..(end - at).min(PIECE_BYTES as u64) as usize];
+            self.file.read_exact_at(part, at).map_err(|e| StoreError::io(&self.path, "read the column", e))?;
+            hash.write(part);
+            at += part.len() as u64;
+        }
+        Ok(hash.finish())
     }
 
     /// Waits until the disk has it.

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub const KILL_AT: &str = "GRAVELOMETER_KILL_AT";
 
 /// Every name that [`fail_point`] is called with.
-pub const FAIL_POINTS: [&str; 7] = [
+pub const FAIL_POINTS: [&str; 15] = [
     "ledger.before_write",
     "ledger.after_write",
     "ledger.after_sync",
@@ -16,7 +16,30 @@ pub const FAIL_POINTS: [&str; 7] = [
     "atomic_file.after_write",
     "atomic_file.before_rename",
     "atomic_file.after_rename",
+    "index.before_manifest",
+    "curvature.before_record",
+    "results.before_sync",
+    "results.before_names",
+    "results.between_names",
+    "results.before_removal",
+    "work_folder.before_removal",
+    "work_folder.before_last_removal",
 ];
+
+/// Environment variable that names a part of the work that panics, `PASS:NUMBER`.
+pub const PANIC_AT: &str = "GRAVELOMETER_PANIC_AT";
+
+/// Panics if the environment names this part of the work. A build without debug assertions does nothing here.
+///
+/// # Panics
+/// As it is asked to.
+#[inline]
+pub fn panic_point(pass: &str, number: u64) {
+    if cfg!(debug_assertions) {
+        let asked = std::env::var(PANIC_AT).is_ok_and(|text| text == format!("{pass}:{number}"));
+        assert!(!asked, "{PANIC_AT} asks for it");
+    }
+}
 
 /// Ends the process at once, without cleaning up, if the environment says so. A build without debug
 /// assertions does nothing here.

@@ -20,7 +20,7 @@ mod shelf;
 pub use atomic_file::{PARTIAL, sync_folder, write_atomically};
 pub use column::{Column, Element};
 pub use error::StoreError;
-pub use fail_point::{FAIL_POINTS, KILL_AT, fail_point};
+pub use fail_point::{FAIL_POINTS, KILL_AT, PANIC_AT, fail_point, panic_point};
 pub use ledger::{Ledger, Record};
 pub use ledger_format::Entry;
 pub use scatter::{Scatter, ScatterWriter};

@@ -1,8 +1,9 @@
 //! The folder in which a run keeps what it needs again.
 
 use super::{Column, Element, Entry, Ledger, StoreError, write_atomically};
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File, OpenOptions, TryLockError};
 use std::path::{Path, PathBuf};
+use twox_hash::XxHash3_64;
 
 /// A folder of columns and scratch files. Stages name what they keep; only the shelf knows where.
 #[derive(Debug, Clone)]
@@ -54,17 +55,50 @@ impl Shelf {
         Column::open(&self.path(name), len)
     }
 
-    /// Writes a small file, whole or not at all.
+    /// Whether there is something of this name.
+    pub fn has(&self, name: &str) -> bool {
+        self.path(name).exists()
+    }
+
+    /// The name of something in the folder, if it is not empty.
+    ///
+    /// # Errors
+    /// It cannot be listed.
+    pub fn anything(&self) -> Result<Option<String>, StoreError> {
+        let first = fs::read_dir(&self.folder).and_then(|mut entries| entries.next().transpose());
+        let first = first.map_err(|e| StoreError::io(&self.folder, "list the folder", e))?;
+        Ok(first.map(|entry| entry.file_name().to_string_lossy().into_owned()))
+    }
+
+    /// An empty file that one process at a time can hold; none if another one does.
+    ///
+    /// # Errors
+    /// It cannot be made.
+    pub fn lock(&self, name: &str) -> Result<Option<File>, StoreError> {
+        let path = self.path(name);
+        let file = OpenOptions::new().append(true).create(true).open(&path);
+        let file = file.map_err(|e| StoreError::io(&path, "make the lock file", e))?;
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => Ok(None),
+            // A file system without locks: nothing can be told.
+            Err(TryLockError::Error(_)) | Ok(()) => Ok(Some(file)),
+        }
+    }
+
+    /// Writes a small file, whole or not at all, with a checksum behind its bytes.
     ///
     /// # Errors
     /// The disk says no.
     pub fn put(&self, name: &str, bytes: &[u8]) -> Result<(), StoreError> {
-        write_atomically(&self.path(name), bytes)
+        let checksum = XxHash3_64::oneshot(bytes).to_le_bytes();
+        write_atomically(&self.path(name), &[bytes, &checksum].concat())
     }
 
-    /// The bytes of a small file, if it is there and can be read.
+    /// The bytes of a small file, if it is there, can be read, and fits its checksum.
     pub fn get(&self, name: &str) -> Option<Vec<u8>> {
-        fs::read(self.path(name)).ok()
+        let mut bytes = fs::read(self.path(name)).ok()?;
+        let checksum = bytes.split_off(bytes.len().checked_sub(size_of::<u64>())?);
+        (checksum == XxHash3_64::oneshot(&bytes).to_le_bytes()).then_some(bytes)
     }
 
     /// Opens the ledger of this name and identity. One of another identity, or a damaged one, is begun anew.
@@ -72,14 +106,26 @@ impl Shelf {
     /// # Errors
     /// As [`Ledger::open`].
     pub fn ledger(&self, name: &str, identity: &str) -> Result<(Ledger, Vec<Entry>), StoreError> {
-        use StoreError::{DamagedHeader, Format, NotALedger, OtherIdentity};
-        match Ledger::open(&self.path(name), identity) {
-            Err(OtherIdentity { .. } | DamagedHeader { .. } | Format { .. } | NotALedger { .. }) => {
-                self.remove(name);
-                Ledger::open(&self.path(name), identity)
-            }
+        match self.ledger_of(name, identity) {
+            Err(StoreError::OtherIdentity { .. } | StoreError::Format { .. }) => self.ledger_anew(name, identity),
             opened => opened,
         }
+    }
+
+    /// Opens the ledger of this name, which must be of this identity if it is there. A damaged one is begun anew.
+    ///
+    /// # Errors
+    /// As [`Ledger::open`].
+    pub fn ledger_of(&self, name: &str, identity: &str) -> Result<(Ledger, Vec<Entry>), StoreError> {
+        match Ledger::open(&self.path(name), identity) {
+            Err(StoreError::DamagedHeader { .. } | StoreError::NotALedger { .. }) => self.ledger_anew(name, identity),
+            opened => opened,
+        }
+    }
+
+    fn ledger_anew(&self, name: &str, identity: &str) -> Result<(Ledger, Vec<Entry>), StoreError> {
+        self.remove(name);
+        Ledger::open(&self.path(name), identity)
     }
 
     /// Bytes that are free on the shelf's disk; none where the system does not tell.

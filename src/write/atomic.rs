@@ -4,7 +4,7 @@
 //! disk and renamed. A run that fails leaves what was there before, and nothing else.
 
 use super::WriteError;
-use crate::store::{PARTIAL, sync_folder};
+use crate::store::{PARTIAL, fail_point, sync_folder};
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -15,6 +15,9 @@ pub const OUTPUTS: [&str; 6] =
 
 /// What GDAL and SQLite may leave beside a file that they did not finish.
 const SIDECARS: [&str; 6] = ["-journal", "-wal", "-shm", ".aux.xml", ".msk.ovr.tmp", ".ovr.tmp"];
+
+/// A file that proves that the folder can be written to.
+const PROBE: &str = ".gravelometer.partial";
 
 /// A folder that exists and can be written to.
 ///
@@ -99,12 +102,10 @@ impl OutputFolder {
         }
     }
 
-    /// Flushes all files to the disk, then gives them their final names, then removes results of an earlier
-    /// run that this one did not write, since they would not belong to the others.
+    /// Gives all files, which lie on the disk, their final names, then removes results of an earlier run that
+    /// this one did not write, since they would not belong to the others.
     pub(crate) fn publish(&self, pending: Vec<Pending>) -> Result<Vec<PathBuf>, WriteError> {
-        for file in &pending {
-            file.sync()?;
-        }
+        fail_point("results.before_names");
         let mut published = Vec::with_capacity(pending.len());
         for file in pending {
             let path = file.target.clone();
@@ -114,9 +115,13 @@ impl OutputFolder {
                 source,
             })?;
             published.push(path);
+            fail_point("results.between_names");
         }
+        fail_point("results.before_removal");
         for name in OUTPUTS {
             let old = self.path.join(name);
+            // What an interrupted run began to write.
+            let _ = fs::remove_file(self.path.join(format!("{name}.{PARTIAL}")));
             if !published.contains(&old) && old.is_file() {
                 fs::remove_file(&old).map_err(|source| WriteError::File {
                     path: old.clone(),
@@ -156,7 +161,8 @@ impl Pending {
         WriteError::File { path: self.target.clone(), action, source }
     }
 
-    fn sync(&self) -> Result<(), WriteError> {
+    /// Flushes the file to the disk.
+    pub(crate) fn sync(&self) -> Result<(), WriteError> {
         let sync = || OpenOptions::new().write(true).open(&self.partial)?.sync_all();
         sync().map_err(|source| self.error("flush the file to the disk", source))
     }
@@ -185,7 +191,7 @@ fn contents(path: &Path, ignoring: &[&str]) -> io::Result<(Vec<String>, usize)> 
     for entry in fs::read_dir(path)? {
         let name = entry?.file_name().to_string_lossy().into_owned();
         let unfinished = OUTPUTS.iter().any(|o| name.starts_with(&format!("{o}.{PARTIAL}")));
-        if unfinished || ignoring.contains(&name.as_str()) {
+        if unfinished || name == PROBE || ignoring.contains(&name.as_str()) {
             continue;
         }
         if OUTPUTS.contains(&name.as_str()) {
@@ -200,7 +206,7 @@ fn contents(path: &Path, ignoring: &[&str]) -> io::Result<(Vec<String>, usize)> 
 
 /// Writes and removes a small file, under a name that no result has.
 fn probe(path: &Path) -> io::Result<()> {
-    let name = path.join(format!(".gravelometer-{}.{PARTIAL}", std::process::id()));
+    let name = path.join(PROBE);
     let write = || -> io::Result<()> {
         let mut file = File::create(&name)?;
         file.write_all(&[0; 4096])?;

@@ -63,7 +63,7 @@ pub enum WriteError {
         source: std::io::Error,
     },
     /// A file cannot be written.
-    #[error("{path}: cannot {action}: {source}\nhelp: check the permissions and the free space on that disk; results under their final names are complete", path = path.display())]
+    #[error("{path}: cannot {action}: {source}\nhelp: check the permissions and the free space on that disk; results under their final names are complete; the same command with --resume goes on from what was found", path = path.display())]
     File {
         /// The file.
         path: PathBuf,
@@ -73,7 +73,7 @@ pub enum WriteError {
         source: std::io::Error,
     },
     /// GDAL reports a failure.
-    #[error("{path}: {step} failed: {message}\nhelp: is the disk full? Otherwise check the GDAL installation with `gdalinfo --formats` and `projinfo EPSG:4326`", path = path.display())]
+    #[error("{path}: {step} failed: {message}\nhelp: is the disk full? With more room the same command with --resume goes on from what was found. Otherwise check the GDAL installation with `gdalinfo --formats` and `projinfo EPSG:4326`", path = path.display())]
     Gdal {
         /// The file.
         path: PathBuf,
@@ -83,7 +83,7 @@ pub enum WriteError {
         message: String,
     },
     /// A layer holds something else than what was put into it.
-    #[error("{path}: layer {layer} holds {found} {what}, but {expected} were written\nhelp: is the disk full?", path = path.display())]
+    #[error("{path}: layer {layer} holds {found} {what}, but {expected} were written\nhelp: is the disk full? With more room the same command with --resume goes on from what was found", path = path.display())]
     IncompleteLayer {
         /// The file.
         path: PathBuf,
@@ -97,7 +97,7 @@ pub enum WriteError {
         found: u64,
     },
     /// A raster band reads back differently from what was put into it.
-    #[error("{path}: band {band} does not read back as it was written\nhelp: is the disk full?", path = path.display())]
+    #[error("{path}: band {band} does not read back as it was written\nhelp: is the disk full? With more room the same command with --resume goes on from what was found", path = path.display())]
     IncompleteBand {
         /// The file.
         path: PathBuf,

@@ -35,6 +35,8 @@ use crate::open::Frame;
 use crate::settings::Settings;
 use crate::statistics::{GrainSizeRaster, Summary};
 use crate::stitch::{Catalogue, TileReport};
+use crate::store::fail_point;
+use atomic::Pending;
 use std::path::PathBuf;
 
 /// Everything that a run found, ready to be written.
@@ -68,6 +70,15 @@ pub struct Results<'a> {
 /// Anything that keeps a file from being complete; then none of the final names has been touched, except
 /// where renaming itself fails.
 pub fn write_all(out: &OutputFolder, results: &Results, progress: &dyn Fn(&str)) -> Result<Vec<PathBuf>, WriteError> {
+    out.publish(write_unnamed(out, results, progress)?)
+}
+
+/// Writes all results to the disk, but not yet under their final names.
+pub(crate) fn write_unnamed(
+    out: &OutputFolder,
+    results: &Results,
+    progress: &dyn Fn(&str),
+) -> Result<Vec<Pending>, WriteError> {
     let raster = GrainSizeRaster::new(
         results.catalogue,
         results.frame,
@@ -92,5 +103,7 @@ pub fn write_all(out: &OutputFolder, results: &Results, progress: &dyn Fn(&str))
         }
         written.push(file);
     }
-    out.publish(written)
+    fail_point("results.before_sync");
+    written.iter().try_for_each(Pending::sync)?;
+    Ok(written)
 }

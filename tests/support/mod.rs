@@ -2,6 +2,7 @@
 #![allow(dead_code, unreachable_pub, missing_docs, clippy::unwrap_used)]
 
 pub mod bed;
+pub mod interrupted;
 pub mod small_disk;
 
 use gravelometer::index::{BuildRoom, Index};
