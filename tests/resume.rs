@@ -9,7 +9,9 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 use support::bed::{Rng, bed, write_ply};
-use support::interrupted::{RESULTS, Scene, WORK, copy, files, results, run_json, said, send};
+#[cfg(debug_assertions)]
+use support::interrupted::{RESULTS, copy};
+use support::interrupted::{Scene, WORK, files, results, run_json, said, send};
 use support::small_disk::SmallDisk;
 
 /// Visits of a commit point at which a run is killed: the first, the second, one in the middle, the last; and the

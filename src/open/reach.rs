@@ -29,8 +29,10 @@ pub struct Reach {
 
 /// Longest survey along an axis, metres. Keeps squares and sums of areas far from the limits of their types.
 const LONGEST_EXTENT_M: f64 = 1e5;
-/// Triangles whose edges are measured to judge unit and precision.
-const SAMPLED_TRIANGLES: u64 = 100_000;
+/// Places in a file, evenly spread, where edges are measured to judge unit and precision.
+const SAMPLED_PLACES: u64 = 256;
+/// Triangles that are measured at each.
+const SAMPLED_TRIANGLES: u64 = 200;
 /// A mean edge above the first, over an extent in plan above the second, is rather one of millimetres: too
 /// coarse to show gravel, metres. The finer pair is that of a box of sand scanned at 0.1 mm.
 const LIKE_MILLIMETRES_M: [(f64, f64); 2] = [(0.2, 50.0), (0.05, 200.0)];
@@ -137,9 +139,7 @@ impl Reach {
     /// Above the last vertex.
     #[inline]
     pub fn color(&self, vertex: u64) -> Option<[f64; 3]> {
-        if self.full_color.is_none() {
-            return None;
-        }
+        self.full_color?;
         let file = self.file_of(vertex, |f| f.first_vertex);
         file.mesh.vertices.color(file.mesh.bytes(), vertex - file.first_vertex)
     }
@@ -177,17 +177,21 @@ impl Reach {
 
     /// Mean edge of a sample of a file's triangles, metres, edges of no length left out; `None` if all are.
     fn sampled_edge_m(&self, file: &SurveyFile) -> Option<f64> {
-        let samples = file.triangles().min(SAMPLED_TRIANGLES);
         let (mut sum, mut edges) = (0.0, 0u32);
-        for sample in 0..samples {
-            let triangle = (u128::from(sample) * u128::from(file.triangles()) / u128::from(samples)) as u64;
-            let [a, b, c] = self.triangle(file.first_triangle + triangle).map(|v| self.position(v));
-            for length in [a.distance(b), b.distance(c), c.distance(a)] {
-                if length > 0.0 {
-                    sum += length;
-                    edges += 1;
+        for place in 0..SAMPLED_PLACES {
+            let part = |i: u64| (u128::from(i) * u128::from(file.triangles()) / u128::from(SAMPLED_PLACES)) as u64;
+            let triangles = part(place)..part(place + 1).min(part(place) + SAMPLED_TRIANGLES);
+            for triangle in triangles {
+                let [a, b, c] = self.triangle(file.first_triangle + triangle).map(|v| self.position(v));
+                for length in [a.distance(b), b.distance(c), c.distance(a)] {
+                    if length > 0.0 {
+                        sum += length;
+                        edges += 1;
+                    }
                 }
             }
+            // Corners may lie anywhere in the file, and every page that is touched brings its neighbours.
+            self.release();
         }
         (edges > 0).then(|| sum / f64::from(edges))
     }
