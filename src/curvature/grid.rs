@@ -42,7 +42,7 @@ fn few_bits(side_m: f64) -> f64 {
 }
 
 /// Where nearly all centroids are: along each axis, the middle 98 in 100 and as much again on both sides.
-fn window(field: &NormalField) -> [[f64; 2]; 3] {
+pub(super) fn window(field: &NormalField) -> [[f64; 2]; 3] {
     let all = &field.centroids;
     let (mut least, mut most) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for &c in all {
@@ -158,6 +158,13 @@ impl Grid {
     /// Columns in plan.
     pub(super) fn columns(&self) -> usize {
         self.count[0] as usize * self.count[1] as usize
+    }
+
+    /// Number of the column that a place belongs to.
+    #[inline(always)]
+    pub(super) fn column(&self, p: DVec3) -> usize {
+        let [ix, iy, _] = self.slot(p);
+        (iy * self.count[0] + ix) as usize
     }
 
     #[inline(always)]
