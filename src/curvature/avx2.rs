@@ -33,8 +33,8 @@ fn column(lanes: Avx2, column: &mut kernel::Column<'_, '_>) {
 }
 
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-fn nearest_column(lanes: Avx2, column: &mut nearest::Column<'_, '_>) {
-    nearest::work(lanes, column);
+fn nearest_run(lanes: Avx2, run: &mut nearest::Run<'_, '_>) {
+    nearest::work(lanes, run);
 }
 
 /// Eight numbers from `i` on.
@@ -203,9 +203,9 @@ impl Lanes for Avx2 {
         unsafe { column(self, work) }
     }
 
-    fn nearest_column(self, work: &mut nearest::Column<'_, '_>) {
+    fn nearest_run(self, work: &mut nearest::Run<'_, '_>) {
         // SAFETY: `self` proves that the instructions are there.
-        unsafe { nearest_column(self, work) }
+        unsafe { nearest_run(self, work) }
     }
 
     #[inline(always)]

@@ -37,8 +37,8 @@ fn column(lanes: Avx512, column: &mut kernel::Column<'_, '_>) {
 }
 
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-fn nearest_column(lanes: Avx512, column: &mut nearest::Column<'_, '_>) {
-    nearest::work(lanes, column);
+fn nearest_run(lanes: Avx512, run: &mut nearest::Run<'_, '_>) {
+    nearest::work(lanes, run);
 }
 
 /// Sixteen numbers from `i` on.
@@ -177,9 +177,9 @@ impl Lanes for Avx512 {
         unsafe { column(self, work) }
     }
 
-    fn nearest_column(self, work: &mut nearest::Column<'_, '_>) {
+    fn nearest_run(self, work: &mut nearest::Run<'_, '_>) {
         // SAFETY: `self` proves that the instructions are there.
-        unsafe { nearest_column(self, work) }
+        unsafe { nearest_run(self, work) }
     }
 
     #[inline(always)]

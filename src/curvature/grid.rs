@@ -42,11 +42,15 @@ fn few_bits(side_m: f64) -> f64 {
 }
 
 /// Where nearly all centroids are: along each axis, the middle 98 in 100 and as much again on both sides.
-fn window(field: &NormalField) -> [[f64; 2]; 3] {
+pub(super) fn window(field: &NormalField) -> [[f64; 2]; 3] {
     let all = &field.centroids;
-    let (mut least, mut most) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for &c in all {
-        (least, most) = (least.min(c), most.max(c));
+    let (mut least, mut most) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for c in all.iter().map(DVec3::to_array) {
+        // `f64::min` does more than an instruction.
+        for axis in 0..3 {
+            least[axis] = if c[axis] < least[axis] { c[axis] } else { least[axis] };
+            most[axis] = if c[axis] > most[axis] { c[axis] } else { most[axis] };
+        }
     }
     let step = (all.len() / SAMPLE).max(1);
     let mut sample = Vec::with_capacity(2 * SAMPLE);
@@ -158,6 +162,13 @@ impl Grid {
     /// Columns in plan.
     pub(super) fn columns(&self) -> usize {
         self.count[0] as usize * self.count[1] as usize
+    }
+
+    /// Number of the column that a place belongs to.
+    #[inline(always)]
+    pub(super) fn column(&self, p: DVec3) -> usize {
+        let [ix, iy, _] = self.slot(p);
+        (iy * self.count[0] + ix) as usize
     }
 
     #[inline(always)]

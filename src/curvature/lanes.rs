@@ -107,8 +107,8 @@ pub(super) trait Lanes: Copy + Send + Sync {
     /// Works one column of vertices compiled for this instruction set.
     fn column(self, column: &mut super::kernel::Column<'_, '_>);
 
-    /// Works one column of the search for nearest centroids.
-    fn nearest_column(self, column: &mut super::nearest::Column<'_, '_>);
+    /// Works a run of columns of the search for nearest centroids.
+    fn nearest_run(self, run: &mut super::nearest::Run<'_, '_>);
 
     /// Keeps the candidates no further than `reach` from some place in a box (given by its centre and half sides) that is
     /// moved by `offset` along an axis, and perhaps others; their coordinates become relative to the centre. With b
@@ -186,32 +186,13 @@ pub(super) fn fetch(field: &NormalField, vertex: DVec3, near: &mut Near) {
     }
 }
 
-impl Plain {
-    /// Keeps the candidates no further than sqrt(`limit`) from a point; their coordinates become relative to it.
-    #[inline(always)]
-    pub(super) fn keep_ball(self, all: &Points, p: [f32; 3], limit: f32, kept: &mut Points) {
-        keep(all, kept, limit, p, |x, y, z| square(x - p[0]) + square(y - p[1]) + square(z - p[2]));
-    }
-
-    /// Least squared distance from the point.
-    #[inline(always)]
-    pub(super) fn least(self, all: &Points, p: [f32; 3]) -> f32 {
-        let mut least = f32::INFINITY;
-        for ((x, y), z) in all.x[..all.len].iter().zip(&all.y[..all.len]).zip(&all.z[..all.len]) {
-            let d2 = square(x - p[0]) + square(y - p[1]) + square(z - p[2]);
-            least = if d2 < least { d2 } else { least };
-        }
-        least
-    }
-}
-
 impl Lanes for Plain {
     fn column(self, column: &mut super::kernel::Column<'_, '_>) {
         super::kernel::work(self, column);
     }
 
-    fn nearest_column(self, column: &mut super::nearest::Column<'_, '_>) {
-        super::nearest::work(self, column);
+    fn nearest_run(self, run: &mut super::nearest::Run<'_, '_>) {
+        super::nearest::work(self, run);
     }
 
     #[inline(always)]

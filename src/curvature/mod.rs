@@ -24,6 +24,7 @@ mod kernel;
 mod lanes;
 mod nearest;
 mod neighbours;
+mod sheet;
 mod thresholds;
 mod visits;
 mod weights;
@@ -39,6 +40,7 @@ use instruction_set::Work;
 use lanes::Lanes;
 use neighbours::Reserve;
 use rayon::prelude::*;
+use sheet::Sheet;
 use visits::Visits;
 use weights::Weighting;
 
@@ -98,11 +100,11 @@ pub fn nearest_centroid_m_with(
     set: InstructionSet,
 ) -> Vec<Option<f64>> {
     let reserve = Reserve::new(field, side_m);
-    let Some(grid) = Grid::new(field, nearest::CELL_SIDES * side_m) else {
+    let Some(sheet) = Sheet::new(field, side_m) else {
         return points.par_iter().map(|&p| reserve.nearest_m(p, side_m)).collect();
     };
-    let visits = Visits::new(&grid, points);
-    let job = nearest::Job { grid: &grid, field, points, side_m, reserve: &reserve };
+    let visits = Visits::new(sheet.columns(), points, |p| sheet.column(p));
+    let job = nearest::Job { sheet: &sheet, field, points, side_m, reserve: &reserve };
     set.run(NearestPass { job: &job, visits: &visits })
 }
 
@@ -127,7 +129,7 @@ pub fn divergence_with(
     let Some(grid) = Some(side_m).filter(|_| !few).and_then(|side_m| Grid::new(field, side_m)) else {
         return points.par_iter().map(|&p| reserve.divergence(p, stencil, &weighting)).collect();
     };
-    let visits = Visits::new(&grid, points);
+    let visits = Visits::new(grid.columns(), points, |p| grid.column(p));
     let job = kernel::Job { grid: &grid, field, points, stencil, weighting, reserve: &reserve };
     set.run(DivergencePass { job: &job, visits: &visits })
 }
@@ -164,8 +166,8 @@ impl Work for NearestPass<'_> {
     type Result = Vec<Option<f64>>;
 
     fn with<L: Lanes>(self, lanes: L) -> Self::Result {
-        self.visits.by_column(nearest::Workspace::default, |work, vertices, found| {
-            lanes.nearest_column(&mut nearest::Column { job: self.job, vertices, found, work });
+        self.visits.by_run(nearest::COLUMNS, Vec::new, |nearest, columns, found| {
+            lanes.nearest_run(&mut nearest::Run { job: self.job, vertices: self.visits.of(columns), found, nearest });
         })
     }
 }

@@ -1,31 +1,32 @@
-//! The distance to the nearest centroid at all vertices of a column of cells.
+//! The distance to the nearest centroid at all vertices of a run of columns.
 //!
-//! Vertices of a cell share a list of candidates, and run in the lanes of vectors: the two least distances in `f32` of
-//! each. Where rounding cannot have confused the two, one exact distance is left to compute. Otherwise the whole block is
-//! looked at again, for all candidates that are as near within rounding. A distance is accepted if nothing outside the
-//! list or the block can be nearer.
+//! Vertices next to one another in a row of columns share their candidates, and run in the lanes of vectors: the two
+//! least distances in `f32` of each. Where rounding cannot have confused the two, one exact distance is left to
+//! compute. Otherwise the columns around the vertex are looked at again, for all candidates that are as near within
+//! rounding. A distance is accepted if nothing outside the columns looked at can be nearer.
+#![allow(clippy::needless_range_loop, reason = "vertices run through several arrays at once")]
 
-use super::block::Group;
-use super::buffer::Points;
-use super::grid::Grid;
-use super::lanes::{Lanes, Plain};
+use super::lanes::Lanes;
 use super::neighbours::{Reserve, distance2};
+use super::sheet::{Entry, Sheet};
 use crate::geometry::DVec3;
 use crate::tile::NormalField;
 
-/// Side of a cell in mean triangle sides.
-pub(super) const CELL_SIDES: f64 = 5.2;
-/// How far a list reaches beyond its vertices, in mean triangle sides.
-const LIST_SIDES: f64 = 1.5;
+/// Columns that one thread works in a row.
+pub(super) const COLUMNS: usize = 512;
 /// Vertices that are worked together.
 const TOGETHER: usize = 16;
-/// Most candidates of a block.
-const BLOCK: usize = 1 << 15;
+/// Columns that vertices worked together are from, at most: sparse places are better worked one by one.
+const WIDEST: i32 = 40;
+/// Columns around its own in which a vertex is looked at again, in turn.
+const RINGS: [i32; 3] = [1, 3, 8];
+/// More candidates of a vertex are left to the exact search, which knows heights.
+const MOST: usize = 1 << 14;
 
-/// Everything that all columns share.
+/// Everything that all runs share.
 pub(super) struct Job<'a> {
     /// The centroids.
-    pub(super) grid: &'a Grid,
+    pub(super) sheet: &'a Sheet,
     /// The field they come from.
     pub(super) field: &'a NormalField,
     /// Where the distance is wanted.
@@ -36,76 +37,53 @@ pub(super) struct Job<'a> {
     pub(super) reserve: &'a Reserve<'a>,
 }
 
-/// Buffers of a thread.
-#[derive(Default)]
-pub(super) struct Workspace {
-    queue: Vec<(i32, u32)>,
-    block: Points,
-    near: Points,
-    close: Vec<(u32, u32)>,
-    again: Vec<(u32, DVec3)>,
-}
-
-/// Vertices of one column.
-pub(super) struct Column<'a, 'j> {
-    /// What all columns share.
+/// Vertices of a run of columns.
+pub(super) struct Run<'a, 'j> {
+    /// What all runs share.
     pub(super) job: &'a Job<'j>,
-    /// Numbers of the vertices.
+    /// Numbers of the vertices, by column.
     pub(super) vertices: &'a [u32],
     /// Their distances, metres.
     pub(super) found: &'a mut [Option<f64>],
-    /// Buffers.
-    pub(super) work: &'a mut Workspace,
+    /// Buffer: for each vertex the candidate that seems to be nearest.
+    pub(super) nearest: &'a mut Vec<u32>,
 }
 
-/// Works a column.
+/// Stands for a vertex whose nearest centroid is not known.
+const UNKNOWN: u32 = u32::MAX;
+
+/// Works a run.
 #[inline(always)]
-pub(super) fn work<L: Lanes>(lanes: L, column: &mut Column<'_, '_>) {
-    let Column { job, vertices, found, work } = column;
-    let point = |i: u32| job.points[vertices[i as usize] as usize];
-    work.queue.clear();
-    work.queue.extend((0..vertices.len() as u32).map(|i| (job.grid.slot(point(i))[2], i)));
-    work.queue.sort_unstable();
-    work.close.clear();
-    let mut rest = &work.queue[..];
-    while let Some(&(level, first)) = rest.first() {
-        let here = rest.iter().position(|e| e.0 != level).unwrap_or(rest.len());
-        let slot = job.grid.slot(point(first));
-        let centre = job.grid.centre(slot);
-        let whole = job.grid.gather(slot, 1, BLOCK, &mut work.block);
-        for group in rest[..here].chunks(TOGETHER) {
-            let mut at = [DVec3::ZERO; TOGETHER];
-            for (at, e) in at.iter_mut().zip(group) {
-                *at = point(e.1) - centre;
+pub(super) fn work<L: Lanes>(_: L, run: &mut Run<'_, '_>) {
+    let Run { job, vertices, found, nearest } = run;
+    nearest.clear();
+    let mut rest = *vertices;
+    while let Some(&first) = rest.first() {
+        let [west, row] = job.sheet.slot(job.points[first as usize]);
+        let mut at = [job.points[first as usize]; TOGETHER];
+        let (mut east, mut n) = (west, 1);
+        for &v in rest.iter().take(TOGETHER).skip(1) {
+            let p = job.points[v as usize];
+            let slot = job.sheet.slot(p);
+            if slot[1] != row || slot[0] - west >= WIDEST {
+                break;
             }
-            let at = &at[..group.len()];
-            let around = Group::around(at);
-            around.narrow(lanes, &work.block, &mut work.near, (LIST_SIDES * job.side_m, 0.0));
-            let two = Two::of(&work.near, &around, at);
-            for (v, &(_, i)) in group.iter().enumerate() {
-                let limit_m = two.limit_m(v, job, at[v]);
-                let reach_m = job.grid.reach_m(slot, 1, at[v]).min(LIST_SIDES * job.side_m);
-                let second_m = f64::from(two.second[v]).sqrt();
-                if whole && limit_m < reach_m && limit_m < second_m {
-                    work.close.push((i, work.near.id[two.nearest[v] as usize]));
-                } else {
-                    work.again.push((i, at[v]));
-                }
-            }
+            (at[n], east, n) = (p, slot[0], n + 1);
         }
-        while let Some((i, at)) = work.again.pop() {
-            if whole && candidates(job, &work.block, &mut work.near, (slot, at)) {
-                work.close.extend(work.near.id[..work.near.len].iter().map(|&t| (i, t)));
-            } else {
-                found[i as usize] = job.reserve.nearest_m(point(i), job.side_m);
-            }
+        let near = job.sheet.around(west..east + 1, row, 1);
+        let few = job.sheet.rows(&near).map(<[Entry]>::len).sum::<usize>() <= MOST;
+        let two = Two::of(job, job.sheet.rows(&near).filter(|_| few), &at);
+        for v in 0..n {
+            let limit_m = limit_m(job, f64::from(two.least[v]).sqrt(), at[v]);
+            let sure = limit_m < f64::from(two.second[v]).sqrt() && limit_m < job.sheet.reach_m(&near, at[v]);
+            nearest.push(if sure { two.nearest[v] } else { UNKNOWN });
         }
-        rest = &rest[here..];
+        rest = &rest[n..];
     }
-    settle(job, &work.close, found, point);
+    settle(job, vertices, nearest, found);
 }
 
-/// The two least squared distances of vertices, m², and the candidate with the least.
+/// The two least squared distances of vertices, m², and the triangle with the least.
 struct Two {
     least: [f32; TOGETHER],
     second: [f32; TOGETHER],
@@ -113,67 +91,76 @@ struct Two {
 }
 
 impl Two {
-    /// Those of the listed candidates.
+    /// Those of the candidates.
     #[inline(always)]
-    fn of(list: &Points, around: &Group, at: &[DVec3]) -> Two {
+    fn of<'e>(job: &Job<'_>, rows: impl Iterator<Item = &'e [Entry]>, at: &[DVec3; TOGETHER]) -> Two {
         let [mut px, mut py, mut pz] = [[0f32; TOGETHER]; 3];
-        let centre = DVec3::from_array(around.centre.map(f64::from));
-        for (v, &at) in at.iter().enumerate() {
-            [px[v], py[v], pz[v]] = (at - centre).as_vec3().to_array();
+        for v in 0..TOGETHER {
+            [px[v], py[v], pz[v]] = (at[v] - job.sheet.centre).as_vec3().to_array();
         }
         let (mut least, mut second) = ([f32::INFINITY; TOGETHER], [f32::INFINITY; TOGETHER]);
-        let mut nearest = [0u32; TOGETHER];
-        let (xs, ys, zs) = (&list.x[..list.len], &list.y[..list.len], &list.z[..list.len]);
-        for (i, ((&x, &y), &z)) in xs.iter().zip(ys).zip(zs).enumerate() {
-            for v in 0..TOGETHER {
-                let (dx, dy, dz) = (x - px[v], y - py[v], z - pz[v]);
-                let d2 = dx * dx + dy * dy + dz * dz;
-                let nearer = d2 < least[v];
-                let other = if nearer { least[v] } else { d2 };
-                second[v] = if other < second[v] { other } else { second[v] };
-                least[v] = if nearer { d2 } else { least[v] };
-                nearest[v] = if nearer { i as u32 } else { nearest[v] };
+        let mut nearest = [UNKNOWN; TOGETHER];
+        for row in rows {
+            for &Entry { at: [x, y, z], id } in row {
+                for v in 0..TOGETHER {
+                    let (dx, dy, dz) = (x - px[v], y - py[v], z - pz[v]);
+                    let d2 = dx * dx + dy * dy + dz * dz;
+                    let before = least[v];
+                    let other = if d2 < before { before } else { d2 };
+                    second[v] = if other < second[v] { other } else { second[v] };
+                    nearest[v] = if d2 < before { id } else { nearest[v] };
+                    least[v] = if d2 < before { d2 } else { before };
+                }
             }
         }
         Two { least, second, nearest }
-    }
-
-    /// How far the nearest centroid of a vertex may seem to be, with rounding.
-    #[inline(always)]
-    fn limit_m(&self, v: usize, job: &Job<'_>, at: DVec3) -> f64 {
-        limit_m(job, f64::from(self.least[v]).sqrt(), at)
     }
 }
 
 /// How far a candidate may seem to be that is as near as the one that seems to be nearest.
 #[inline(always)]
-fn limit_m(job: &Job<'_>, least_m: f64, at: DVec3) -> f64 {
-    let size = at.abs().max_element() + least_m + job.grid.cell_m;
-    let each = f64::from(f32::EPSILON) * 2.0 * size + 8.0 * f64::EPSILON * (job.grid.magnitude_m() + size);
+fn limit_m(job: &Job<'_>, least_m: f64, p: DVec3) -> f64 {
+    let size = (p - job.sheet.centre).abs().max_element() + least_m + job.sheet.column_m;
+    let each = f64::from(f32::EPSILON) * 2.0 * size + job.sheet.rounding_m(p);
     least_m * (1.0 + 1e-6) + 8.0 * each
 }
 
-/// Exact distances of the candidates (pairs of vertex and triangle, in the order of vertices). Apart from the search
-/// for them, so that the processor waits for many of them at once.
+/// Exact distances of the nearest candidates. Apart from the search for them, so that the processor waits for many of
+/// them at once.
 #[inline(always)]
-fn settle(job: &Job<'_>, close: &[(u32, u32)], found: &mut [Option<f64>], point: impl Fn(u32) -> DVec3) {
-    let mut least = (u32::MAX, f64::INFINITY);
-    for &(i, t) in close {
-        let d2 = distance2(job.field.centroids[t as usize], point(i));
-        least = if i == least.0 && least.1 < d2 { least } else { (i, d2) };
-        found[i as usize] = Some(least.1.sqrt()).filter(|&d| d < job.field.loaded.margin_m(point(i)));
+fn settle(job: &Job<'_>, vertices: &[u32], nearest: &[u32], found: &mut [Option<f64>]) {
+    for ((&v, &t), found) in vertices.iter().zip(nearest).zip(found) {
+        let p = job.points[v as usize];
+        *found = match job.field.centroids.get(t as usize) {
+            Some(&c) => Some(distance2(c, p).sqrt()).filter(|&d| d < job.field.loaded.margin_m(p)),
+            None => again(job, p),
+        };
     }
 }
 
-/// Finds the candidates among which the nearest centroid is; false where the block may not hold it.
-#[inline(always)]
-fn candidates(job: &Job<'_>, block: &Points, near: &mut Points, (slot, at): ([i32; 3], DVec3)) -> bool {
-    let here = at.as_vec3().to_array();
-    let least_m = f64::from(Plain.least(block, here)).sqrt();
-    let limit_m = limit_m(job, least_m, at);
-    if limit_m >= job.grid.reach_m(slot, 1, at) || !least_m.is_finite() {
-        return false;
+/// Looks for the nearest centroid among all that seem to be as near.
+#[inline(never)]
+fn again(job: &Job<'_>, p: DVec3) -> Option<f64> {
+    let [column, row] = job.sheet.slot(p);
+    let [px, py, pz] = (p - job.sheet.centre).as_vec3().to_array();
+    let square = |e: &Entry| {
+        let (dx, dy, dz) = (e.at[0] - px, e.at[1] - py, e.at[2] - pz);
+        dx * dx + dy * dy + dz * dz
+    };
+    for rings in RINGS {
+        let near = job.sheet.around(column..column + 1, row, rings);
+        if job.sheet.rows(&near).map(<[Entry]>::len).sum::<usize>() > MOST {
+            break;
+        }
+        let least = job.sheet.rows(&near).flatten().fold(f32::INFINITY, |least, e| least.min(square(e)));
+        let limit_m = limit_m(job, f64::from(least).sqrt(), p);
+        if limit_m >= job.sheet.reach_m(&near, p) || !least.is_finite() {
+            continue;
+        }
+        let limit = (limit_m * limit_m) as f32;
+        let as_near = job.sheet.rows(&near).flatten().filter(|e| square(e) <= limit);
+        let d2 = as_near.fold(f64::INFINITY, |d2, e| d2.min(distance2(job.field.centroids[e.id as usize], p)));
+        return Some(d2.sqrt()).filter(|&d| d < job.field.loaded.margin_m(p));
     }
-    Plain.keep_ball(block, here, (limit_m * limit_m) as f32, near);
-    near.len > 0
+    job.reserve.nearest_m(p, job.side_m)
 }

@@ -1,11 +1,11 @@
-//! Points in the order in which they are worked: column by column of the grid, many columns at a time.
+//! Points in the order in which they are worked: column by column, many columns at a time.
 
-use super::grid::Grid;
 use crate::geometry::DVec3;
 use rayon::prelude::*;
+use std::ops::Range;
 
-/// Columns that one thread works in a row.
-const RUN: usize = 32;
+/// Columns that one thread works in a row, where it works them one by one.
+const COLUMNS: usize = 32;
 
 /// Runs of each thread, before their values are put in place.
 const TURN: usize = 64;
@@ -19,17 +19,15 @@ pub(super) struct Visits {
 }
 
 impl Visits {
-    /// Sorts points by the column of the grid they are in.
-    pub(super) fn new(grid: &Grid, points: &[DVec3]) -> Visits {
-        let columns = grid.columns();
+    /// Sorts points by the column (of so many) that they are in.
+    pub(super) fn new(columns: usize, points: &[DVec3], column: impl Fn(DVec3) -> usize) -> Visits {
         let mut start = vec![0u32; columns + 2];
         let place: Vec<u32> = points
             .iter()
             .map(|&p| {
-                let [ix, iy, _] = grid.slot(p);
-                let column = (iy * grid.count[0] + ix) as u32;
-                start[column as usize + 2] += 1;
-                column
+                let column = column(p);
+                start[column + 2] += 1;
+                column as u32
             })
             .collect();
         for i in 2..start.len() {
@@ -45,34 +43,52 @@ impl Visits {
         Visits { order, start }
     }
 
-    /// Values of all points, in their own order, from work on runs of columns in parallel.
+    /// Values of all points, in their own order, from work on single columns in parallel.
     pub(super) fn by_column<S>(
         &self,
         workspace: impl Fn() -> S + Sync + Send,
         work: impl Fn(&mut S, &[u32], &mut [Option<f64>]) + Sync + Send,
     ) -> Vec<Option<f64>> {
+        self.by_run(COLUMNS, workspace, |state, columns, found| {
+            let first = self.start[columns.start] as usize;
+            for column in columns {
+                let (a, b) = (self.start[column] as usize, self.start[column + 1] as usize);
+                if a < b {
+                    work(state, &self.order[a..b], &mut found[a - first..b - first]);
+                }
+            }
+        })
+    }
+
+    /// Points of a run of columns, column by column.
+    pub(super) fn of(&self, columns: Range<usize>) -> &[u32] {
+        &self.order[self.start[columns.start] as usize..self.start[columns.end] as usize]
+    }
+
+    /// Values of all points, in their own order, from work on runs of so many columns in parallel.
+    pub(super) fn by_run<S>(
+        &self,
+        run_columns: usize,
+        workspace: impl Fn() -> S + Sync + Send,
+        work: impl Fn(&mut S, Range<usize>, &mut [Option<f64>]) + Sync + Send,
+    ) -> Vec<Option<f64>> {
         let columns = self.start.len() - 1;
-        let runs = columns.div_ceil(RUN);
+        let runs = columns.div_ceil(run_columns);
+        let of_run = |run: usize| run * run_columns..((run + 1) * run_columns).min(columns);
         // In turns, so that values are not kept twice.
         let turn = TURN * rayon::current_num_threads();
         let mut values = vec![None; self.order.len()];
         for first in (0..runs).step_by(turn) {
-            let found: Vec<Vec<Option<f64>>> = (first..(first + turn).min(runs))
+            let end = (first + turn).min(runs);
+            let found: Vec<Vec<Option<f64>>> = (first..end)
                 .into_par_iter()
                 .map_init(&workspace, |state, run| {
-                    let columns = run * RUN..((run + 1) * RUN).min(columns);
-                    let first = self.start[columns.start] as usize;
-                    let mut found = vec![None; self.start[columns.end] as usize - first];
-                    for column in columns {
-                        let (a, b) = (self.start[column] as usize, self.start[column + 1] as usize);
-                        if a < b {
-                            work(state, &self.order[a..b], &mut found[a - first..b - first]);
-                        }
-                    }
+                    let mut found = vec![None; self.of(of_run(run)).len()];
+                    work(state, of_run(run), &mut found);
                     found
                 })
                 .collect();
-            let points = &self.order[self.start[first * RUN] as usize..];
+            let points = self.of(of_run(first).start..of_run(end - 1).end);
             for (&point, value) in points.iter().zip(found.iter().flatten()) {
                 values[point as usize] = *value;
             }

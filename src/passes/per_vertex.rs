@@ -3,14 +3,19 @@
 use super::{Survey, TileError};
 use crate::curvature::{Stencil, divergence, nearest_centroid_m};
 use crate::geometry::{DVec3, ExactSum};
+use crate::index::{CellBlock, Index};
 use crate::pipeline::{Crew, Interrupted, LostJob, Reservation, Stages, Stopped, over_jobs};
 use crate::progress::{Progress, Unit};
+use crate::store::StoreError;
 use crate::tile::NormalField;
 use std::convert::Infallible;
 use std::ops::Range;
 
 /// A value at each point, or none where something beyond the field could change it.
 type PointValues<'f> = dyn Fn(&NormalField, &[DVec3]) -> Vec<Option<f64>> + Sync + 'f;
+
+/// How the field of a block is loaded.
+type Load = fn(&Index, &CellBlock) -> Result<NormalField, StoreError>;
 
 /// The values of a tile's core: for each run of vertices the first of its values.
 struct CoreValues {
@@ -31,7 +36,7 @@ impl Survey<'_> {
         let stages = Stages {
             footprint_bytes: |job| self.field_bytes(job, 3.0 * side_m),
             work: |job, reservation: &mut Reservation| {
-                let core = self.of_core(job, 3.0 * side_m, &nearest, reservation)?;
+                let core = self.of_core(job, 3.0 * side_m, (NormalField::load_centroids, &nearest), reservation)?;
                 let mut sum = ExactSum::ZERO;
                 core.values.iter().for_each(|&d| sum.add(d));
                 Ok::<_, TileError>((core.values.len() as u64, sum))
@@ -65,7 +70,9 @@ impl Survey<'_> {
         let values = |field: &NormalField, points: &[DVec3]| divergence(field, points, stencil);
         let stages = Stages {
             footprint_bytes: |job| self.field_bytes(job, stencil.reach_m()),
-            work: |job, reservation: &mut Reservation| self.of_core(job, stencil.reach_m(), &values, reservation),
+            work: |job, reservation: &mut Reservation| {
+                self.of_core(job, stencil.reach_m(), (NormalField::load, &values), reservation)
+            },
         };
         let vertices = |job: usize| self.index.vertices.count(&self.index.grid, self.core(job));
         progress.begin("curvature", jobs.iter().map(|&job| vertices(job)).sum(), Unit::Vertices);
@@ -86,7 +93,7 @@ impl Survey<'_> {
         &self,
         job: usize,
         halo_m: f64,
-        values: &PointValues,
+        (load, values): (Load, &PointValues),
         reservation: &mut Reservation,
     ) -> Result<CoreValues, TileError> {
         let (index, core) = (self.index, self.core(job));
@@ -95,7 +102,7 @@ impl Survey<'_> {
         for run in &runs {
             index.positions().each(run.clone(), |p| points.push(DVec3::from_array(p)))?;
         }
-        let field = NormalField::load(index, &self.with_halo(core, halo_m))?;
+        let field = load(index, &self.with_halo(core, halo_m))?;
         let mut found = values(&field, &points);
         drop(field);
         let mut wider_m = halo_m;
@@ -105,7 +112,7 @@ impl Survey<'_> {
             reservation
                 .change_to(NormalField::footprint_bytes(self.triangles_in(&block)))
                 .map_err(|over| TileError::TooWide { halo_m: wider_m, over })?;
-            let field = NormalField::load(index, &block)?;
+            let field = load(index, &block)?;
             let open: Vec<usize> = (0..found.len()).filter(|&i| found[i].is_none()).collect();
             let again: Vec<DVec3> = open.iter().map(|&i| points[i]).collect();
             for (i, value) in open.into_iter().zip(values(&field, &again)) {

@@ -52,7 +52,12 @@ impl<T: Element, const N: usize> Element for [T; N] {
     }
     #[inline(always)]
     fn get(from: &[u8]) -> Self {
-        std::array::from_fn(|i| T::get(&from[i * T::BYTES..(i + 1) * T::BYTES]))
+        // Not by `array::from_fn`, which the compiler may leave as calls.
+        let mut elements = [T::get(&from[..T::BYTES]); N];
+        for (element, part) in elements.iter_mut().zip(from.chunks_exact(T::BYTES)) {
+            *element = T::get(part);
+        }
+        elements
     }
 }
 

@@ -1,6 +1,6 @@
 //! The normal field of a tile: what a curvature stencil averages.
 
-use super::Patch;
+use super::patch::each_triangle;
 use crate::geometry::{DVec3, PlanBox, triangle_centroid, triangle_normal};
 use crate::index::{CellBlock, Index};
 use crate::store::StoreError;
@@ -10,7 +10,7 @@ use crate::store::StoreError;
 pub struct NormalField {
     /// Centroids, local metres.
     pub centroids: Vec<DVec3>,
-    /// Unit normals; zero where a triangle has no area.
+    /// Unit normals; zero where a triangle has no area. Empty where only centroids were loaded.
     pub normals: Vec<DVec3>,
     /// What was loaded, in plan: every centroid inside is here. Infinite where the survey ends.
     pub loaded: PlanBox,
@@ -22,16 +22,44 @@ impl NormalField {
     /// # Errors
     /// The index cannot be read.
     pub fn load(index: &Index, block: &CellBlock) -> Result<NormalField, StoreError> {
-        let patch = Patch::load(index, block)?;
-        let (mut centroids, mut normals) = (Vec::with_capacity(patch.corners.len()), Vec::new());
-        centroids.extend(patch.each_corners().map(triangle_centroid));
-        normals.extend(patch.each_corners().map(triangle_normal));
-        Ok(NormalField { centroids, normals, loaded: index.grid.plan(block) })
+        let mut field = NormalField::empty(index, block);
+        field.normals.reserve_exact(field.centroids.capacity());
+        each_triangle(index, block, |place, corners| {
+            put(&mut field.centroids, place, triangle_centroid(corners));
+            put(&mut field.normals, place, triangle_normal(corners));
+        })?;
+        Ok(field)
+    }
+
+    /// Loads centroids only: enough for the search for nearest ones.
+    ///
+    /// # Errors
+    /// The index cannot be read.
+    pub fn load_centroids(index: &Index, block: &CellBlock) -> Result<NormalField, StoreError> {
+        let mut field = NormalField::empty(index, block);
+        each_triangle(index, block, |place, corners| put(&mut field.centroids, place, triangle_centroid(corners)))?;
+        Ok(field)
+    }
+
+    /// Without triangles, but with room for the centroids of a block.
+    fn empty(index: &Index, block: &CellBlock) -> NormalField {
+        let triangles = index.triangles.count(&index.grid, block) as usize;
+        let centroids = Vec::with_capacity(triangles);
+        NormalField { centroids, normals: Vec::new(), loaded: index.grid.plan(block) }
     }
 
     /// Bytes that a field of this many triangles takes while it is worked on: 48 for itself, 16 for the points of
     /// its core, 30 for grids and results, 8 for the exact search where it is needed.
     pub fn footprint_bytes(triangles: u64) -> u64 {
         triangles * 102
+    }
+}
+
+/// Puts a value in its place, which is at most the next.
+#[inline(always)]
+fn put(values: &mut Vec<DVec3>, place: usize, value: DVec3) {
+    match values.get_mut(place) {
+        Some(there) => *there = value,
+        None => values.push(value),
     }
 }

@@ -44,6 +44,57 @@ impl Patch {
     }
 }
 
+/// Hands the corners (local metres) of every triangle of a block to `take` with its local number, nearly all in order:
+/// those with a vertex outside the block come twice, first with places that mean nothing, and at the end as they are.
+///
+/// # Errors
+/// The index cannot be read.
+pub(super) fn each_triangle(
+    index: &Index,
+    block: &CellBlock,
+    mut take: impl FnMut(usize, [DVec3; 3]),
+) -> Result<(), StoreError> {
+    let inside = Runs::new(index.vertices.ranges(&index.grid, block));
+    let mut positions = Vec::with_capacity(inside.len());
+    each_of(index.positions(), &inside, |p| positions.push(DVec3::from_array(p)))?;
+    let mut lookup = Lookup::new(&inside);
+    let mut cut: Vec<(usize, [u64; 3])> = Vec::new();
+    let mut triangle = 0;
+    for range in index.triangles.ranges(&index.grid, block) {
+        index.each_corners(range, |numbers| {
+            let mut corners = [DVec3::ZERO; 3];
+            let mut whole = true;
+            for (corner, &number) in corners.iter_mut().zip(&numbers) {
+                match lookup.local(number) {
+                    Some(v) => *corner = positions[v as usize],
+                    None => whole = false,
+                }
+            }
+            if !whole {
+                cut.push((triangle, numbers));
+            }
+            take(triangle, corners);
+            triangle += 1;
+        })?;
+    }
+    let mut outside: Vec<u64> =
+        cut.iter().flat_map(|(_, numbers)| numbers).copied().filter(|&v| inside.local(v).is_none()).collect();
+    outside.sort_unstable();
+    outside.dedup();
+    let outside = Runs::new(outside.into_iter().map(|v| v..v + 1).collect());
+    let mut beyond = Vec::with_capacity(outside.len());
+    each_of(index.positions(), &outside, |p| beyond.push(DVec3::from_array(p)))?;
+    for (triangle, numbers) in cut {
+        let position = |v: u64| match (inside.local(v), outside.local(v)) {
+            (Some(local), _) => positions[local as usize],
+            (None, Some(local)) => beyond[local as usize],
+            (None, None) => DVec3::ZERO,
+        };
+        take(triangle, numbers.map(position));
+    }
+    Ok(())
+}
+
 /// Corners of the triangles as local numbers: those of `inside`, and behind them, in the order in which they
 /// were met, each time anew, those outside, which are returned by their survey numbers.
 fn corners(index: &Index, triangles: &Runs, inside: &Runs) -> Result<(Vec<[u32; 3]>, Vec<u64>), StoreError> {

@@ -68,31 +68,36 @@ impl Runs {
 /// Looks local numbers up, quickly where neighbours follow one another.
 pub(super) struct Lookup<'a> {
     runs: &'a Runs,
-    /// Runs that were met last: triangles have corners in their own row of cells and the two beside it.
-    recent: [usize; 3],
+    /// Runs that were met last: triangles have corners in their own row of cells and the two beside it. First number,
+    /// how many, and the local number of the first.
+    recent: [(u64, u64, u32); 3],
 }
 
 impl<'a> Lookup<'a> {
     pub(super) fn new(runs: &'a Runs) -> Lookup<'a> {
-        Lookup { runs, recent: [0; 3] }
+        Lookup { runs, recent: [(0, 0, 0); 3] }
     }
 
     /// The local number, if the runs hold it.
-    #[inline]
+    #[inline(always)]
     pub(super) fn local(&mut self, number: u64) -> Option<u32> {
-        for i in 0..3 {
-            let run = self.recent[i];
-            if let Some(range) = self.runs.ranges.get(run)
-                && range.contains(&number)
-            {
-                return Some(self.runs.before[run] + (number - range.start) as u32);
+        for (start, count, before) in self.recent {
+            let within = number.wrapping_sub(start);
+            if within < count {
+                return Some(before + within as u32);
             }
         }
+        self.searched(number)
+    }
+
+    #[inline(never)]
+    fn searched(&mut self, number: u64) -> Option<u32> {
         let run = self.runs.ranges.partition_point(|r| r.end <= number);
         let range = self.runs.ranges.get(run).filter(|r| r.contains(&number))?;
+        let before = self.runs.before[run];
         self.recent.rotate_right(1);
-        self.recent[0] = run;
-        Some(self.runs.before[run] + (number - range.start) as u32)
+        self.recent[0] = (range.start, range.end - range.start, before);
+        Some(before + (number - range.start) as u32)
     }
 }
 
