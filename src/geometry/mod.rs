@@ -82,7 +82,7 @@ impl ExactSum {
 
     /// Adds one term.
     pub fn add(&mut self, term: f64) {
-        self.0 += (term * Self::SCALE) as i128;
+        self.0 += fixed(term);
     }
 
     /// Adds another sum.
@@ -96,9 +96,36 @@ impl ExactSum {
     }
 }
 
+/// A finite number below 2^62 in size, times 2^64, cut off to a whole one. The conversion that the language has
+/// goes through a slow library function.
+fn fixed(term: f64) -> i128 {
+    let bits = term.to_bits();
+    // What is too small for an implicit leading bit is far below 2^-64.
+    let exponent = (bits >> 52 & 0x7ff) as i32;
+    let mantissa = i128::from(bits & ((1 << 52) - 1) | 1 << 52);
+    let size = match exponent - 1075 + 64 {
+        up @ 0..=75 => mantissa << up,
+        down @ -63..0 => mantissa >> -down,
+        _ => 0,
+    };
+    if bits >> 63 == 1 { -size } else { size }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn terms_are_cut_off_as_the_language_converts_them() {
+        let mut term = 4e18f64;
+        while term > 1e-30 {
+            for t in [term, -term, term.floor(), term * 1.000_000_1] {
+                assert_eq!(fixed(t), (t * ExactSum::SCALE) as i128, "{t:e}");
+            }
+            term *= 0.7391;
+        }
+        assert_eq!([0.0, -0.0, f64::MIN_POSITIVE, 5e-324].map(fixed), [0; 4]);
+    }
 
     #[test]
     fn an_exact_sum_does_not_depend_on_order() {
