@@ -212,17 +212,23 @@ impl Grid {
                 let lowest = self.lowest[column];
                 let from = lowest.max(*levels.start());
                 let to = levels.end().saturating_add(1).min(lowest.saturating_add((end - first) as i32));
-                for iz in from..to {
-                    let cell_at = first as usize + (iz - lowest) as usize;
-                    let (a, m) = (self.cell[cell_at] as usize, (self.cell[cell_at + 1] - self.cell[cell_at]) as usize);
-                    if n + m > most {
-                        return false;
-                    }
-                    let shift = |axis: usize, index: i32| (index - slot[axis]) as f32 * cell;
-                    moved(&self.x[a..], shift(0, ix), m, &mut block.x[n..]);
-                    moved(&self.y[a..], shift(1, iy), m, &mut block.y[n..]);
+                if from >= to {
+                    continue;
+                }
+                // The levels of a column are neighbours in memory: only heights are shifted level by level.
+                let at = first as usize + (from - lowest) as usize;
+                let cells = &self.cell[at..=at + (to - from) as usize];
+                let (a, m) = (cells[0] as usize, (cells[cells.len() - 1] - cells[0]) as usize);
+                if n + m > most {
+                    return false;
+                }
+                let shift = |axis: usize, index: i32| (index - slot[axis]) as f32 * cell;
+                moved(&self.x[a..], shift(0, ix), m, &mut block.x[n..]);
+                moved(&self.y[a..], shift(1, iy), m, &mut block.y[n..]);
+                copied(&self.id[a..], m, &mut block.id[n..]);
+                for (iz, level) in (from..to).zip(cells.windows(2)) {
+                    let (a, m) = (level[0] as usize, (level[1] - level[0]) as usize);
                     moved(&self.z[a..], shift(2, iz), m, &mut block.z[n..]);
-                    copied(&self.id[a..], m, &mut block.id[n..]);
                     n += m;
                 }
             }

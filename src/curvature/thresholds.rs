@@ -19,7 +19,7 @@ pub(super) const COMPLETE: f64 = 32_700.0;
 pub(super) const HIGHEST: i16 = 32_698;
 
 /// Rounds that count only; later ones also find the ranks on both sides of the threshold.
-const COUNTING: u32 = 3;
+const COUNTING: u32 = 2;
 
 /// Adding it rounds a number below 2^22 to an integer in the low bits: vectors have no saturating conversion.
 const INTEGER: f32 = 12_582_912.0;
