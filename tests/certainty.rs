@@ -248,10 +248,10 @@ fn what_a_tile_with_a_thin_halo_claims_to_know_is_true_after_every_step() {
         for _ in 0..60 {
             let mut side = |n: u32| {
                 let first = rng.below(n as usize) as u32;
-                first..(first + 1 + rng.below(3) as u32).min(n)
+                first..(first + 2 + 2 * rng.below(3) as u32).min(n)
             };
             let core = CellBlock { columns: side(grid.columns), rows: side(grid.rows) };
-            let block = grid.grown(&core, rng.below(5) as u32);
+            let block = grid.grown(&core, 2 * rng.below(5) as u32);
             let mesh = TileMesh::load(&worked.index, Owned::Cells(&core), &block).unwrap();
             let (states, found, what) = segmented(&worked, &recipe, &mesh);
             let ids: Vec<u64> = (0..mesh.triangles.len() as u32).map(|t| mesh.triangle_id(t)).collect();
