@@ -91,7 +91,7 @@ fn visit(name: &str) {
 fn die() -> ! {
     if cfg!(unix) {
         // A signal that nothing can catch; where there is no such program, abort comes near.
-        let _ = Command::new("kill").args(["-9", &std::process::id().to_string()]).status();
+        let _ = Command::new("sh").args(["-c", &format!("kill -9 {}", std::process::id())]).status();
     }
     std::process::abort()
 }
