@@ -3,7 +3,7 @@
 use super::chunks::over_chunks_then;
 use super::ground::Ground;
 use super::identity::Numbers;
-use super::shards::{Shard, by_cell, holding};
+use super::shards::{Shard, by_cell};
 use crate::geometry::DVec3;
 use crate::open::Surface;
 use crate::store::{Column, Element, Scatter, Shelf, StoreError};
@@ -90,7 +90,6 @@ pub(super) fn sort(
         start.extend(of_shard[..cells].iter().map(|&s| shard.vertices.start + u64::from(s)));
     }
     start.push(ground.vertices);
-    debug_assert_eq!(holding(shards, ground.vertices), shards.len());
     Ok(start)
 }
 

@@ -27,7 +27,7 @@ pub struct Recipe<'a> {
     pub usual_width_m: Option<f64>,
 }
 
-/// How far a tile looks beyond its core at first, cells.
+/// How far an attempt looks beyond a block, cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Halo {
     south: u32,
@@ -161,11 +161,7 @@ impl Survey<'_> {
         recipe: &Recipe,
         found: &mut Found,
     ) -> Result<Vec<u64>, TileError> {
-        let mesh = TileMesh::load(self.index, owned, block)?;
-        let mut divergence = Vec::with_capacity(mesh.positions.len());
-        each_of(recipe.divergence, &mesh.vertex_runs, |d| divergence.push(d))?;
-        let settled = segment(&mesh, &divergence, &self.index.scale, recipe.settings, &mut |_, _| {});
-        drop(divergence);
+        let (mesh, settled) = self.segmented(owned, block, recipe)?;
         found.segmented += mesh.triangles.len() as u64;
         found.attempts += 1;
         let Settled { grains, oversize, unsettled } = settled;
@@ -179,6 +175,20 @@ impl Survey<'_> {
         found.grains.extend(measured);
         found.oversize.extend(oversize);
         Ok(unsettled.into_iter().map(|t| mesh.triangle_id(t)).collect())
+    }
+
+    /// Loads and segments a block.
+    pub(super) fn segmented(
+        &self,
+        owned: Owned,
+        block: &CellBlock,
+        recipe: &Recipe,
+    ) -> Result<(TileMesh, Settled), TileError> {
+        let mesh = TileMesh::load(self.index, owned, block)?;
+        let mut divergence = Vec::with_capacity(mesh.positions.len());
+        each_of(recipe.divergence, &mesh.vertex_runs, |d| divergence.push(d))?;
+        let settled = segment(&mesh, &divergence, &self.index.scale, recipe.settings, &mut |_, _| {});
+        Ok((mesh, settled))
     }
 
     /// Colours of a tile's vertices, and what stands for full colour.

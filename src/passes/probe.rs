@@ -4,8 +4,7 @@ use super::grains::Recipe;
 use super::{Survey, TileError};
 use crate::geometry::PlanBox;
 use crate::index::CellBlock;
-use crate::segment::segment;
-use crate::tile::{Owned, TileMesh, each_of};
+use crate::tile::Owned;
 
 /// Triangles that are looked at.
 const TRIANGLES: f64 = 2.5e5;
@@ -41,10 +40,7 @@ impl Survey<'_> {
         };
         let grid = &self.index.grid;
         let block = CellBlock { columns: middle(&core.columns, grid.columns), rows: middle(&core.rows, grid.rows) };
-        let mesh = TileMesh::load(self.index, Owned::Cells(&block), &block)?;
-        let mut divergence = Vec::with_capacity(mesh.positions.len());
-        each_of(recipe.divergence, &mesh.vertex_runs, |d| divergence.push(d))?;
-        let found = segment(&mesh, &divergence, &self.index.scale, recipe.settings, &mut |_, _| {});
+        let (mesh, found) = self.segmented(Owned::Cells(&block), &block, recipe)?;
         let width_m = |triangles: &[u32]| {
             let mut bounds = PlanBox::EMPTY;
             triangles.iter().flat_map(|&t| mesh.corners(t)).for_each(|c| bounds.include(c));

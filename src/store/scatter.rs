@@ -44,11 +44,6 @@ impl<R: Element> Scatter<R> {
         ScatterWriter { of: self, buffers: vec![Vec::new(); self.blocks.len()] }
     }
 
-    /// Memory that a writer may take, bytes.
-    pub fn writer_bytes(buckets: usize) -> u64 {
-        (buckets * (BLOCK_BYTES + R::BYTES)) as u64
-    }
-
     /// All records of a bucket, in no particular order.
     ///
     /// # Errors
