@@ -100,7 +100,7 @@ impl Error {
     pub fn exit_code(&self) -> ExitCode {
         match self {
             Error::Settings(_) | Error::Raster(_) | Error::Forecast(_) => ExitCode::Usage,
-            Error::Resume(ResumeError::Changed { .. }) => ExitCode::Usage,
+            Error::Resume(ResumeError::Changed { .. } | ResumeError::Finished { .. }) => ExitCode::Usage,
             Error::Open(open) if open.is_about_settings() => ExitCode::Usage,
             Error::Interrupted(_) => ExitCode::Interrupted,
             _ => ExitCode::Failed,

@@ -7,7 +7,7 @@ use gravelometer::demo::{Demonstration, demonstrate};
 use gravelometer::error::{Error, ExitCode};
 use gravelometer::pipeline::{Cancelled, Control, Interrupted};
 use gravelometer::progress::Progress;
-use gravelometer::run::{Job, run};
+use gravelometer::run::{Job, is_done, run};
 use gravelometer::settings::InputSettings;
 use std::io::Write;
 use std::time::Duration;
@@ -61,6 +61,10 @@ fn run_command(args: &RunArgs) -> Result<ExitCode, Error> {
         work: args.work_dir.clone(),
     };
     let progress = reporter(args.log);
+    if is_done(&job)? {
+        progress.note(&format!("{} holds the results of this run: nothing is left to do", job.out.display()));
+        return Ok(ExitCode::Done);
+    }
     let outcome = run(&job, &*progress, &control(&*progress, args.log))?;
     if args.log == Log::Text {
         progress.note(&cost_table(&outcome.costs, outcome.triangles));

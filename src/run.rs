@@ -7,10 +7,10 @@ use crate::forecast;
 use crate::index::{BuildRoom, Index};
 use crate::measure::Wanted;
 use crate::open::Reach;
-use crate::passes::{Recipe, Survey};
+use crate::passes::{Probe, Recipe, Survey};
 use crate::pipeline::{Budget, Control, Crew, LostJob, memory_there_bytes};
 use crate::progress::{Progress, Unit};
-use crate::resume::{WORK, WorkFolder};
+use crate::resume::{ResumeError, WORK, WorkFolder, changes_since_finished, whole_identity};
 use crate::segment::smallest_grain_area_m2;
 use crate::settings::Settings;
 use crate::statistics::RasterGrid;
@@ -55,6 +55,24 @@ pub struct Outcome {
     pub costs: Costs,
 }
 
+/// Whether a job that is to be resumed is done already: its results are there, from the same inputs and settings.
+///
+/// # Errors
+/// An input cannot be read, or the results that are there are those of another run.
+pub fn is_done(job: &Job) -> Result<bool, Error> {
+    let report_is_there = || job.out.join("run.json").is_file();
+    if !job.resume || job.force || WorkFolder::holds_run(job.work.as_deref(), &job.out) || !report_is_there() {
+        return Ok(false);
+    }
+    job.settings.check()?;
+    let (reach, _) = Reach::open(&job.inputs, &job.settings.input, &|_, _| {})?;
+    match changes_since_finished(&job.out, &reach, &job.settings) {
+        Some(changes) if changes.is_empty() => Ok(true),
+        Some(changes) => Err(ResumeError::Finished { path: job.out.clone(), changes }.into()),
+        None => Ok(false),
+    }
+}
+
 /// Runs a job: opens the survey, works it tile by tile, and writes the results.
 ///
 /// The result does not depend on `settings.work`: neither on the tile size, nor on the threads, nor on the
@@ -97,14 +115,16 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     check_outputs(&reach, &index, settings)?;
 
     // plan
-    let sizes = forecast::core_sizes(&index, settings, threads, room.bytes);
     let mut curvature = work.curvature(&reach, &index, settings)?;
-    let vertex_plan = Plan::new(&index, curvature.core(sizes.curvature)?);
-    let plan = Plan::new(&index, findings.core(sizes.grains)?);
+    let core = forecast::curvature_core(&index, settings, threads, room.bytes);
+    let vertex_plan = Plan::new(&index, curvature.core(core)?);
+    let cores = forecast::grain_cores(&index, settings, threads, room.bytes);
+    let plan = Plan::new(&index, cores.largest);
     let tiles_bytes = forecast::tiles_bytes(&Survey { index: &index, plan: &plan }, settings, threads, room.bytes)?;
     progress.note(&format!(
-        "{} tiles of {:.3} x {:.3} m, {threads} threads; peak memory about {} MiB of {} MiB",
+        "{} tiles{} of {:.3} x {:.3} m, {threads} threads; peak memory about {} MiB of {} MiB",
         plan.tiles.len(),
+        if cores.divisible { " or more" } else { "" },
         plan.core_m(&index)[0],
         plan.core_m(&index)[1],
         (tiles_bytes + forecast::fixed_bytes(&reach)) >> 20,
@@ -130,9 +150,14 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let wanted = Wanted { outline_step_m, triangle_ids: settings.output.labelled_mesh };
     let recipe =
         Recipe { settings: &settings.segment, divergence: curvature.divergence(), wanted, usual_width_m: None };
-    let survey = Survey { index: &index, plan: &plan };
-    let probe = crew.pool.install(|| survey.probe(&recipe))?;
+    let probe = match cores.divisible || plan.tiles.len() > 1 {
+        true => crew.pool.install(|| survey.probe(&recipe))?,
+        false => Probe::default(),
+    };
     let recipe = Recipe { usual_width_m: probe.usual_width_m, ..recipe };
+    let plan = Plan::new(&index, findings.core(cores.size(&index, threads, probe.usual_width_m))?);
+    let survey = Survey { index: &index, plan: &plan };
+
     let jobs = findings.missing(&plan);
     if jobs.len() < plan.tiles.len() {
         progress.note(&format!("{} of {} tiles are done already", plan.tiles.len() - jobs.len(), plan.tiles.len()));
@@ -150,6 +175,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let mut facts = facts(&reach, &index, &plan, &warnings, &lost);
     let segmented_per_triangle = segmented_per_triangle(&tiles, probe.segmented);
     facts["segmented_per_triangle"] = segmented_per_triangle.into();
+    facts["identity"] = whole_identity(&reach, settings);
     let mesh = WholeMesh::new(&reach);
     let surveyed = index.triangles.occupied(&index.grid);
     let results = Results {

@@ -319,10 +319,23 @@ fn a_work_folder_that_cannot_be_written_is_named() {
 fn results_that_are_there_are_not_replaced_where_there_is_nothing_to_resume() {
     let scene = Scene::new();
     let out = scene.path("whole");
-    for more in [&["--resume"][..], &["--resume", "--max-grain=0.5"]] {
-        said(&mut scene.run(&out, more)).fails(1, &["holds files already", "--force"]);
-        scene.is_whole(&out, "a refused run");
+    let was = files(&out);
+    // The same run, however its work is cut.
+    for more in [&["--resume"][..], &["--resume", "--threads=1", "--tile-size=0.7"]] {
+        let again = said(&mut scene.run(&out, more));
+        assert!(again.code == Some(0) && again.err.contains("nothing is left to do"), "{:?} {}", again.code, again.err);
+        assert!(files(&out) == was, "{more:?} changed something");
     }
+    let changes = ["--max-grain=0.5", "--set=raster.cell_m=0.3", "--offset=1,2,3"];
+    for (change, name) in changes.iter().zip(["segment.max_grain_m", "raster.cell_m", "input.offset"]) {
+        said(&mut scene.run(&out, &["--resume", change])).fails(2, &["is done, and was another one", name, "--force"]);
+    }
+    said(&mut scene.run(&out, &[])).fails(1, &["holds files already", "--force"]);
+    // Without a report nobody knows what the other results are.
+    std::fs::rename(out.join("run.json"), scene.path("run.json")).unwrap();
+    said(&mut scene.run(&out, &["--resume"])).fails(1, &["holds files already", "--force"]);
+    std::fs::rename(scene.path("run.json"), out.join("run.json")).unwrap();
+    assert!(files(&out) == was, "a refused run changed something");
 }
 
 #[cfg(debug_assertions)]

@@ -59,13 +59,13 @@ fn write_survey(f: &mut Formatter<'_>, survey: &SurveyFigures, files: usize) -> 
     row(f, "preset", format!("configs/{}.toml{coarse}", s.preset.name()))?;
     let limits = format!("--min-grain-area {:e} --max-grain {}", s.min_grain_area_m2, s.max_grain_m);
     row(f, "suggested limits", limits)?;
-    let m = &survey.memory;
-    let verdict = match (m.there_bytes, m.untiled_fits) {
-        (Some(there), Some(true)) => format!("fits in the {} that are there", bytes(there)),
-        (Some(there), _) => format!("does not fit in the {} that are there: run in tiles", bytes(there)),
-        _ => "what is there is not known".to_owned(),
-    };
-    row(f, "memory, untiled", format!("about {}; {verdict}", bytes(m.untiled_bytes)))
+    let needs = &survey.needs;
+    let least = format!("at least {}", bytes(needs.least_memory_bytes));
+    row(f, "memory", format!("{least}; with {} it is worked in one piece", bytes(needs.whole_memory_bytes)))?;
+    if let Some(there) = needs.memory_there_bytes {
+        row(f, "memory there", format!("{}, of which a run takes half unless --memory says otherwise", bytes(there)))?;
+    }
+    row(f, "disk for the index", bytes(needs.disk_bytes))
 }
 
 fn write_contents(f: &mut Formatter<'_>, c: &Contents) -> fmt::Result {

@@ -1,7 +1,7 @@
 //! A first look at a survey: what is in the files, what they can show, and what a run would take.
 
 mod display;
-mod memory;
+mod needs;
 mod suggestion;
 
 use crate::geometry::{DVec3, ExactSum};
@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::path::PathBuf;
 
-pub use memory::{Memory, STATE_BYTES_PER_TRIANGLE};
+pub use needs::Needs;
 pub use suggestion::{Preset, Suggestion};
 
 /// What a survey holds, whole and file by file.
@@ -47,8 +47,8 @@ pub struct SurveyFigures {
     pub surface: SurfaceFigures,
     /// What the survey can show, and settings for it.
     pub suggestion: Suggestion,
-    /// What an untiled run would take.
-    pub memory: Memory,
+    /// What a run would take.
+    pub needs: Needs,
 }
 
 /// One file.
@@ -132,7 +132,7 @@ pub fn inspect(paths: &[PathBuf], input: &InputSettings) -> Result<Inspection, O
         has_colors: reach.has_colors(),
         surface,
         suggestion: Suggestion::new(&surface, reach.has_colors()),
-        memory: Memory::untiled(reach.triangles(), memory_there_bytes()),
+        needs: Needs::of(&reach, memory_there_bytes()),
     };
     Ok(Inspection { survey, files, warnings: warnings.iter().map(ToString::to_string).collect() })
 }

@@ -23,23 +23,16 @@ pub struct Probe {
 }
 
 impl Survey<'_> {
-    /// Segments a small block in the middle tile, if there are several tiles.
+    /// Segments a small block around the middle triangle of the survey.
     ///
     /// # Errors
     /// The index cannot be read.
     pub fn probe(&self, recipe: &Recipe) -> Result<Probe, TileError> {
-        if self.plan.tiles.len() < 2 {
-            return Ok(Probe::default());
-        }
-        let core = self.core(self.plan.tiles.len() / 2);
+        let (cell, _) = self.index.triangles.cell_of(self.index.scale.triangles / 2);
+        let [column, row] = self.index.grid.place(cell);
         let per_cell = self.index.scale.triangles as f64 / self.index.triangles.occupied_cells().max(1) as f64;
-        let side = (TRIANGLES / per_cell).sqrt() as u32;
-        let middle = |r: &std::ops::Range<u32>, n: u32| {
-            let first = ((r.start + r.end) / 2).saturating_sub(side / 2);
-            first..first.saturating_add(side).min(n)
-        };
-        let grid = &self.index.grid;
-        let block = CellBlock { columns: middle(&core.columns, grid.columns), rows: middle(&core.rows, grid.rows) };
+        let half = ((TRIANGLES / per_cell).sqrt() / 2.0) as u32;
+        let block = self.index.grid.grown(&CellBlock { columns: column..column + 1, rows: row..row + 1 }, half);
         let (mesh, found) = self.segmented(Owned::Cells(&block), &block, recipe)?;
         let width_m = |triangles: &[u32]| {
             let mut bounds = PlanBox::EMPTY;

@@ -48,10 +48,24 @@ impl Identity {
         self
     }
 
+    /// With everything that any result depends on as well.
+    pub(super) fn and_all(mut self, settings: &Settings) -> Identity {
+        if let Value::Object(sections) = serde_json::json!(settings) {
+            // How the work is cut never changes a result.
+            sections.into_iter().filter(|(name, _)| name != "work").for_each(|(name, values)| self.add(&name, values));
+        }
+        self
+    }
+
     fn add(&mut self, section: &str, values: Value) {
         if let Value::Object(values) = values {
             self.0.extend(values.into_iter().map(|(name, value)| (format!("{section}.{name}"), value)));
         }
+    }
+
+    /// Names and values.
+    pub(super) fn value(self) -> Value {
+        Value::Object(self.0)
     }
 
     /// As one line of text, the same for the same values.

@@ -14,10 +14,12 @@
 
 mod curvature;
 mod findings;
+mod finished;
 mod identity;
 
 pub use curvature::Curvature;
 pub use findings::Findings;
+pub use finished::{changes_since_finished, whole_identity};
 pub use identity::Change;
 
 use crate::error::Error;
@@ -82,11 +84,23 @@ pub enum ResumeError {
         /// Something in it.
         found: String,
     },
+    /// There is nothing to resume, and the results that are there are those of another run.
+    #[error(
+        "the run in {} is done, and was another one:\n{}\nhelp: give --force to replace its results, or go back to what was",
+        path.display(),
+        listed(changes)
+    )]
+    Finished {
+        /// The folder of the results.
+        path: PathBuf,
+        /// What changed.
+        changes: Vec<Change>,
+    },
     /// The interrupted run was another one.
     #[error(
         "the run in {} cannot be resumed, because it was another one:\n{}\nhelp: go back to what was, or leave out --resume to start over",
         path.display(),
-        changes.iter().map(|c| format!("  {c}")).collect::<Vec<_>>().join("\n")
+        listed(changes)
     )]
     Changed {
         /// The work folder.
@@ -94,6 +108,10 @@ pub enum ResumeError {
         /// What changed.
         changes: Vec<Change>,
     },
+}
+
+fn listed(changes: &[Change]) -> String {
+    changes.iter().map(|c| format!("  {c}")).collect::<Vec<_>>().join("\n")
 }
 
 impl WorkFolder {

@@ -1,6 +1,6 @@
 //! Planning: how the survey is cut into tiles.
 
-use crate::index::{CellBlock, Index};
+use crate::index::{CellBlock, CellGrid, Index};
 
 /// One tile: its number and the cells of its core.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -78,5 +78,12 @@ impl CoreSize {
         let border = |&(across, up): &(u64, u64)| (across - 1) * rows + (up - 1) * columns;
         let (across, up) = cuts.min_by_key(|cut| (border(cut), cut.0)).unwrap_or((columns, rows));
         CoreSize { columns: columns.div_ceil(across) as u32, rows: rows.div_ceil(up) as u32 }
+    }
+
+    /// Length of the borders between cores for each cell of the grid, cells.
+    pub fn border(&self, grid: &CellGrid) -> f64 {
+        let cuts = |all: u32, core: u32| f64::from(all.div_ceil(core) - 1);
+        let (columns, rows) = (f64::from(grid.columns), f64::from(grid.rows));
+        (cuts(grid.columns, self.columns) * rows + cuts(grid.rows, self.rows) * columns) / (columns * rows)
     }
 }

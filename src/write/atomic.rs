@@ -103,9 +103,17 @@ impl OutputFolder {
     }
 
     /// Gives all files, which lie on the disk, their final names, then removes results of an earlier run that
-    /// this one did not write, since they would not belong to the others.
+    /// this one did not write, since they would not belong to the others. The report, which comes last, goes first:
+    /// where it is, what lies beside it belongs to it.
     pub(crate) fn publish(&self, pending: Vec<Pending>) -> Result<Vec<PathBuf>, WriteError> {
         fail_point("results.before_names");
+        let report = self.path.join(OUTPUTS[OUTPUTS.len() - 1]);
+        match fs::remove_file(&report) {
+            Err(source) if source.kind() != io::ErrorKind::NotFound => {
+                return Err(WriteError::File { path: report, action: "remove the report of an earlier run", source });
+            }
+            _ => {}
+        }
         let mut published = Vec::with_capacity(pending.len());
         for file in pending {
             let path = file.target.clone();
