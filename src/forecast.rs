@@ -10,8 +10,9 @@ use crate::tile::{CoreSize, NormalField, TileMesh};
 const BASE_BYTES: u64 = 64 << 20;
 /// Memory for tiles, or for sorting, without which a run makes no sense, bytes.
 const LEAST_BYTES: u64 = 16 << 20;
-/// Largest core of the curvature pass, triangles: more only makes the last tile wait for longer.
-const LARGEST_CURVATURE_CORE: f64 = 2e6;
+/// Largest core of the curvature pass, triangles. With larger ones every tile takes new pages from the system; with
+/// smaller ones halos weigh more.
+const LARGEST_CURVATURE_CORE: f64 = 5e5;
 /// Triangles of a curvature core with its halo, for each of the core.
 const WITH_HALO: f64 = 1.1;
 /// Widths of a grain that are worked once more along a border between two cores, halos and second looks together.

@@ -70,11 +70,12 @@ fn run_command(args: &RunArgs) -> Result<ExitCode, Error> {
         progress.note(&cost_table(&outcome.costs, outcome.triangles));
     }
     progress.note(&format!(
-        "{} grains and {} oversize bodies in {}; {:.2} triangles segmented for each of the survey",
+        "{} grains and {} oversize bodies in {}; halos included, {:.2} triangles were segmented for each of the survey{}",
         outcome.catalogue.grains.len(),
         outcome.catalogue.oversize.len(),
         job.out.display(),
-        outcome.segmented_per_triangle
+        outcome.segmented_per_triangle,
+        outcome.curvature_per_triangle.map_or_else(String::new, |n| format!(", and {n:.2} looked at for curvature"))
     ));
     if outcome.lost.is_empty() {
         return Ok(ExitCode::Done);

@@ -49,6 +49,8 @@ pub struct Outcome {
     pub lost: Vec<LostJob>,
     /// Triangles segmented for each triangle of the survey: what halos cost.
     pub segmented_per_triangle: f64,
+    /// Triangles loaded for curvature for each triangle of the tiles whose curvature was not known: what halos cost.
+    pub curvature_per_triangle: Option<f64>,
     /// Triangles of the survey.
     pub triangles: u64,
     /// What each stage cost.
@@ -139,8 +141,11 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let stencil = Stencil::new(index.scale.spacing_m, index.scale.mean_triangle_area_m2, &settings.curvature);
     let survey = Survey { index: &index, plan: &vertex_plan };
     let jobs = curvature.missing(&index, &vertex_plan)?;
-    let lost = survey.divergence(&crew, &jobs, &stencil, progress, |job, runs, values| {
-        curvature.add(vertex_plan.tiles[job].id, runs, values)
+    let (mut loaded, mut owned) = (0, 0);
+    let lost = survey.divergence(&crew, &jobs, &stencil, progress, |job, core| {
+        loaded += core.loaded;
+        owned += survey.owned_triangles(job);
+        curvature.add(vertex_plan.tiles[job].id, &core.runs, &core.values)
     })?;
     none_lost("curvature", lost)?;
     curvature.sync()?;
@@ -175,6 +180,8 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let mut facts = facts(&reach, &index, &plan, &warnings, &lost);
     let segmented_per_triangle = segmented_per_triangle(&tiles, probe.segmented);
     facts["segmented_per_triangle"] = segmented_per_triangle.into();
+    let curvature_per_triangle = (owned > 0).then(|| loaded as f64 / owned as f64);
+    facts["curvature_per_triangle"] = curvature_per_triangle.into();
     facts["identity"] = whole_identity(&reach, settings);
     let mesh = WholeMesh::new(&reach);
     let surveyed = index.triangles.occupied(&index.grid);
@@ -196,7 +203,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
         work.finish();
     }
     let (triangles, costs) = (reach.triangles(), meter.costs());
-    Ok(Outcome { files, catalogue, lost, segmented_per_triangle, triangles, costs })
+    Ok(Outcome { files, catalogue, lost, segmented_per_triangle, curvature_per_triangle, triangles, costs })
 }
 
 /// Outlines within this many mean edges touch: grains are separated by a valley of a few triangles.

@@ -11,7 +11,7 @@ use gravelometer::curvature::Stencil;
 use gravelometer::index::{BuildRoom, CellBlock, Index};
 use gravelometer::measure::Wanted;
 use gravelometer::open::MemorySurface;
-use gravelometer::passes::{Recipe, Survey};
+use gravelometer::passes::{CoreValues, Recipe, Survey};
 use gravelometer::pipeline::{Budget, Control, Crew};
 use gravelometer::progress::Silent;
 use gravelometer::segment::state::State;
@@ -60,9 +60,10 @@ fn worked(surface: &MemorySurface, tiling: Tiling) -> Worked<'_> {
     let divergence = Shelf::new(folder.path()).unwrap().create("divergence", index.scale.vertices).unwrap();
     let jobs: Vec<usize> = (0..plan.tiles.len()).collect();
     let survey = Survey { index: &index, plan: &plan };
-    let keep = |_, runs: &[Range<u64>], values: &[f64]| {
-        let mut values = values.iter().copied();
-        runs.iter()
+    let keep = |_, core: CoreValues| {
+        let mut values = core.values.into_iter();
+        core.runs
+            .iter()
             .try_for_each(|run| divergence.write(run.start, values.by_ref().take((run.end - run.start) as usize)))
     };
     let lost = survey.divergence(&crew, &jobs, &stencil, &Silent, keep).unwrap();

@@ -10,6 +10,7 @@ mod per_vertex;
 mod probe;
 
 pub use grains::Recipe;
+pub use per_vertex::CoreValues;
 pub use probe::Probe;
 
 use crate::index::{CellBlock, Index};
@@ -54,6 +55,11 @@ impl Survey<'_> {
 
     fn triangles_in(&self, block: &CellBlock) -> u64 {
         self.index.triangles.count(&self.index.grid, block)
+    }
+
+    /// Triangles that a tile owns.
+    pub fn owned_triangles(&self, job: usize) -> u64 {
+        self.triangles_in(self.core(job))
     }
 
     fn core(&self, job: usize) -> &CellBlock {

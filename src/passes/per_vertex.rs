@@ -17,10 +17,15 @@ type PointValues<'f> = dyn Fn(&NormalField, &[DVec3]) -> Vec<Option<f64>> + Sync
 /// How the field of a block is loaded.
 type Load = fn(&Index, &CellBlock) -> Result<NormalField, StoreError>;
 
-/// The values of a tile's core: for each run of vertices the first of its values.
-struct CoreValues {
-    runs: Vec<Range<u64>>,
-    values: Vec<f64>,
+/// The values at the vertices of a tile's core.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CoreValues {
+    /// Runs of the survey's vertices.
+    pub runs: Vec<Range<u64>>,
+    /// The values of all of them, behind one another.
+    pub values: Vec<f64>,
+    /// Triangles that were loaded for them, halos and second looks included.
+    pub loaded: u64,
 }
 
 impl Survey<'_> {
@@ -55,7 +60,7 @@ impl Survey<'_> {
     }
 
     /// Divergence of the normal field at every vertex, 1/m, for the tiles of `jobs`. `collect` gets from every
-    /// tile, in their order, its runs of vertices, and behind one another the values of all.
+    /// tile, in their order, the values of its core.
     ///
     /// # Errors
     /// When interrupted, or when `collect` fails, as on a full disk.
@@ -65,7 +70,7 @@ impl Survey<'_> {
         jobs: &[usize],
         stencil: &Stencil,
         progress: &dyn Progress,
-        mut collect: impl FnMut(usize, &[Range<u64>], &[f64]) -> Result<(), C>,
+        mut collect: impl FnMut(usize, CoreValues) -> Result<(), C>,
     ) -> Result<Vec<LostJob>, Stopped<C>> {
         let values = |field: &NormalField, points: &[DVec3]| divergence(field, points, stencil);
         let stages = Stages {
@@ -78,7 +83,7 @@ impl Survey<'_> {
         progress.begin("curvature", jobs.iter().map(|&job| vertices(job)).sum(), Unit::Vertices);
         let lost = over_jobs(crew, jobs, &stages, |job, core: CoreValues| {
             progress.advance(core.values.len() as u64);
-            collect(job, &core.runs, &core.values)
+            collect(job, core)
         });
         progress.end();
         lost
@@ -103,6 +108,7 @@ impl Survey<'_> {
             index.positions().each(run.clone(), |p| points.push(DVec3::from_array(p)))?;
         }
         let field = load(index, &self.with_halo(core, halo_m))?;
+        let mut loaded = field.centroids.len() as u64;
         let mut found = values(&field, &points);
         drop(field);
         let mut wider_m = halo_m;
@@ -113,12 +119,13 @@ impl Survey<'_> {
                 .change_to(NormalField::footprint_bytes(self.triangles_in(&block)))
                 .map_err(|over| TileError::TooWide { halo_m: wider_m, over })?;
             let field = load(index, &block)?;
+            loaded += field.centroids.len() as u64;
             let open: Vec<usize> = (0..found.len()).filter(|&i| found[i].is_none()).collect();
             let again: Vec<DVec3> = open.iter().map(|&i| points[i]).collect();
             for (i, value) in open.into_iter().zip(values(&field, &again)) {
                 found[i] = value;
             }
         }
-        Ok(CoreValues { runs, values: found.into_iter().flatten().collect() })
+        Ok(CoreValues { runs, values: found.into_iter().flatten().collect(), loaded })
     }
 }
