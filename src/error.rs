@@ -1,5 +1,6 @@
 //! What can end a run, and how the process then exits.
 
+use crate::curvature::InstructionSet;
 use crate::demo::DemoError;
 use crate::forecast::ForecastError;
 use crate::index::IndexError;
@@ -61,6 +62,14 @@ pub enum Error {
     /// A look at part of the survey failed.
     #[error(transparent)]
     Tile(#[from] TileError),
+    /// The processor lacks what was asked for.
+    #[error("work.instructions: this processor has no {wanted:?}; it has {available:?}\nhelp: leave it at \"auto\"")]
+    Instructions {
+        /// What was asked for.
+        wanted: InstructionSet,
+        /// What there is.
+        available: Vec<InstructionSet>,
+    },
     /// The compute threads could not be started.
     #[error("cannot start {threads} compute threads: {source}\nhelp: ask for fewer with --threads")]
     Threads {
@@ -99,7 +108,7 @@ impl Error {
     /// The exit code that fits.
     pub fn exit_code(&self) -> ExitCode {
         match self {
-            Error::Settings(_) | Error::Raster(_) | Error::Forecast(_) => ExitCode::Usage,
+            Error::Settings(_) | Error::Instructions { .. } | Error::Raster(_) | Error::Forecast(_) => ExitCode::Usage,
             Error::Resume(ResumeError::Changed { .. } | ResumeError::Finished { .. }) => ExitCode::Usage,
             Error::Open(open) if open.is_about_settings() => ExitCode::Usage,
             Error::Interrupted(_) => ExitCode::Interrupted,

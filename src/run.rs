@@ -1,7 +1,7 @@
 //! The page that shows the river: from files to files.
 
 use crate::costs::{Costs, Meter};
-use crate::curvature::Stencil;
+use crate::curvature::{InstructionSet, Stencil};
 use crate::error::Error;
 use crate::forecast;
 use crate::index::{BuildRoom, Index};
@@ -12,7 +12,7 @@ use crate::pipeline::{Budget, Control, Crew, LostJob, memory_there_bytes};
 use crate::progress::{Progress, Unit};
 use crate::resume::{ResumeError, WORK, WorkFolder, changes_since_finished, whole_identity};
 use crate::segment::smallest_grain_area_m2;
-use crate::settings::Settings;
+use crate::settings::{Instructions, Settings};
 use crate::statistics::RasterGrid;
 use crate::stitch::{Catalogue, TileReport, stitch};
 use crate::tile::Plan;
@@ -93,7 +93,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     folder.spare(&job.inputs)?;
     let mut work = WorkFolder::open(job.work.as_deref(), &job.out)?;
     let (pool, memory) = (pool(settings)?, memory_bytes(settings));
-    let threads = pool.current_num_threads();
+    let (threads, instructions) = (pool.current_num_threads(), instructions(settings)?);
 
     // open
     let (reach, warnings) = pool.install(|| open(job, progress))?;
@@ -122,7 +122,8 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let vertex_plan = Plan::new(&index, curvature.core(core)?);
     let cores = forecast::grain_cores(&index, settings, threads, room.bytes);
     let plan = Plan::new(&index, cores.largest);
-    let tiles_bytes = forecast::tiles_bytes(&Survey { index: &index, plan: &plan }, settings, threads, room.bytes)?;
+    let tiles_bytes =
+        forecast::tiles_bytes(&Survey { index: &index, plan: &plan, instructions }, settings, threads, room.bytes)?;
     progress.note(&format!(
         "{} tiles{} of {:.3} x {:.3} m, {threads} threads; peak memory about {} MiB of {} MiB",
         plan.tiles.len(),
@@ -135,11 +136,11 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
 
     // tile by tile: spacing, curvature
     index.scale.spacing_m = curvature.spacing_m(|| {
-        let (spacing_m, lost) = Survey { index: &index, plan: &vertex_plan }.spacing(&crew, progress)?;
+        let (spacing_m, lost) = Survey { index: &index, plan: &vertex_plan, instructions }.spacing(&crew, progress)?;
         none_lost("spacing", lost).map(|()| spacing_m)
     })?;
     let stencil = Stencil::new(index.scale.spacing_m, index.scale.mean_triangle_area_m2, &settings.curvature);
-    let survey = Survey { index: &index, plan: &vertex_plan };
+    let survey = Survey { index: &index, plan: &vertex_plan, instructions };
     let jobs = curvature.missing(&index, &vertex_plan)?;
     let (mut loaded, mut owned) = (0, 0);
     let lost = survey.divergence(&crew, &jobs, &stencil, progress, |job, core| {
@@ -161,7 +162,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     };
     let recipe = Recipe { usual_width_m: probe.usual_width_m, ..recipe };
     let plan = Plan::new(&index, findings.core(cores.size(&index, threads, probe.usual_width_m))?);
-    let survey = Survey { index: &index, plan: &plan };
+    let survey = Survey { index: &index, plan: &plan, instructions };
 
     let jobs = findings.missing(&plan);
     if jobs.len() < plan.tiles.len() {
@@ -220,6 +221,17 @@ fn pool(settings: &Settings) -> Result<rayon::ThreadPool, Error> {
         .thread_name(|i| format!("worker-{i}"))
         .build()
         .map_err(|source| Error::Threads { threads, source })
+}
+
+fn instructions(settings: &Settings) -> Result<InstructionSet, Error> {
+    let wanted = match settings.work.instructions {
+        Instructions::Auto => return Ok(InstructionSet::best()),
+        Instructions::Avx512 => InstructionSet::Avx512,
+        Instructions::Avx2 => InstructionSet::Avx2,
+        Instructions::Scalar => InstructionSet::Scalar,
+    };
+    let available = InstructionSet::available();
+    if available.contains(&wanted) { Ok(wanted) } else { Err(Error::Instructions { wanted, available }) }
 }
 
 fn memory_bytes(settings: &Settings) -> u64 {

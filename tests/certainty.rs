@@ -7,7 +7,7 @@
 
 mod support;
 
-use gravelometer::curvature::Stencil;
+use gravelometer::curvature::{InstructionSet, Stencil};
 use gravelometer::index::{BuildRoom, CellBlock, Index};
 use gravelometer::measure::Wanted;
 use gravelometer::open::MemorySurface;
@@ -21,7 +21,6 @@ use gravelometer::stitch::{Catalogue, TileReport, stitch};
 use gravelometer::store::{Column, Shelf};
 use gravelometer::tile::{CoreSize, Owned, Plan, TileMesh, each_of};
 use std::convert::Infallible;
-use std::ops::Range;
 use support::bed::{Rng, bed, shuffled};
 
 const WANTED: Wanted = Wanted { outline_step_m: 1.0 / 1_048_576.0, triangle_ids: true };
@@ -52,14 +51,15 @@ fn worked(surface: &MemorySurface, tiling: Tiling) -> Worked<'_> {
     let room = BuildRoom { bytes: tiling.memory_bytes, wide: tiling.threads > 1 };
     let mut index = crew.pool.install(|| support::indexed_with(surface, room));
     let plan = Plan::new(&index, CoreSize::square(&index, tiling.tile_size_m));
-    let (spacing_m, lost) = Survey { index: &index, plan: &plan }.spacing(&crew, &Silent).unwrap();
+    let instructions = InstructionSet::best();
+    let (spacing_m, lost) = Survey { index: &index, plan: &plan, instructions }.spacing(&crew, &Silent).unwrap();
     assert!(lost.is_empty(), "{lost:?}");
     index.scale.spacing_m = spacing_m;
     let stencil = Stencil::new(spacing_m, index.scale.mean_triangle_area_m2, &CurvatureSettings::default());
     let folder = tempfile::tempdir().unwrap();
     let divergence = Shelf::new(folder.path()).unwrap().create("divergence", index.scale.vertices).unwrap();
     let jobs: Vec<usize> = (0..plan.tiles.len()).collect();
-    let survey = Survey { index: &index, plan: &plan };
+    let survey = Survey { index: &index, plan: &plan, instructions };
     let keep = |_, core: CoreValues| {
         let mut values = core.values.into_iter();
         core.runs
@@ -79,7 +79,7 @@ fn values(column: &Column<f64>) -> Vec<f64> {
 
 fn catalogue(worked: &Worked, settings: &SegmentSettings, tiling: Tiling) -> (Catalogue, Vec<TileReport>) {
     let plan = Plan::new(&worked.index, CoreSize::square(&worked.index, tiling.tile_size_m));
-    let survey = Survey { index: &worked.index, plan: &plan };
+    let survey = Survey { index: &worked.index, plan: &plan, instructions: InstructionSet::best() };
     let recipe = Recipe { settings, divergence: &worked.divergence, wanted: WANTED, usual_width_m: None };
     let jobs: Vec<usize> = (0..plan.tiles.len()).collect();
     let mut findings = Vec::new();

@@ -1,4 +1,4 @@
-//! Files do not know how they were made: tiles, threads and memory change no byte of the results, and an
+//! Files do not know how they were made: tiles, threads, memory and vector instructions change no byte of the results, and an
 //! offset changes the coordinates by itself and nothing else.
 #![allow(missing_docs, clippy::unwrap_used, unreachable_pub)]
 
@@ -6,10 +6,11 @@ mod support;
 
 use gdal::Dataset;
 use gdal::vector::LayerAccess;
+use gravelometer::curvature::InstructionSet;
 use gravelometer::pipeline::Control;
 use gravelometer::progress::Silent;
 use gravelometer::run::{Job, Outcome, run};
-use gravelometer::settings::Settings;
+use gravelometer::settings::{Instructions, Settings};
 use std::path::{Path, PathBuf};
 use support::bed::{bed, shuffled, write_ply};
 
@@ -18,6 +19,7 @@ struct Work {
     tile_size_m: f64,
     threads: usize,
     memory: &'static str,
+    instructions: Instructions,
     offset: [f64; 3],
 }
 
@@ -38,6 +40,7 @@ impl Scene {
         settings.work.tile_size_m = work.tile_size_m;
         settings.work.threads = work.threads;
         settings.work.memory = work.memory.into();
+        settings.work.instructions = work.instructions;
         settings.input.offset = work.offset;
         let out = self.folder.path().join(name);
         let job = Job {
@@ -98,24 +101,35 @@ fn outlines(out: &Path) -> Vec<(u64, Vec<[f64; 2]>)> {
     layer.features().map(of_feature).collect()
 }
 
+/// The vector instructions that `auto` would take if the best were not there.
+fn second_best() -> Instructions {
+    match InstructionSet::available().as_slice() {
+        [.., InstructionSet::Avx2, _] => Instructions::Avx2,
+        _ => Instructions::Scalar,
+    }
+}
+
 fn is_invariant(scene: &Scene, sizes_m: [f64; 2]) -> Outcome {
     let none = [0.0; 3];
-    let one = Work { tile_size_m: 1e6, threads: 2, memory: "", offset: none };
+    let instructions = Instructions::Scalar;
+    let one = Work { tile_size_m: 1e6, threads: 2, memory: "", instructions, offset: none };
     let (reference, outcome, tiles) = scene.run("one", &one);
     assert_eq!(tiles, 1);
+    let sets = [Instructions::Auto, second_best()];
     for (i, (threads, memory)) in [(1, "96MiB"), (2, "96MiB")].into_iter().enumerate() {
-        let work = Work { tile_size_m: sizes_m[i], threads, memory, offset: none };
+        let work = Work { tile_size_m: sizes_m[i], threads, memory, instructions: sets[i], offset: none };
         let (out, _, tiles) = scene.run(&format!("tiled-{i}"), &work);
         assert!(tiles >= [9, 60][i], "{tiles} tiles");
         for name in ["grains.csv", "labelled_mesh.ply", "summary.json"] {
             let same = std::fs::read(reference.join(name)).unwrap() == std::fs::read(out.join(name)).unwrap();
-            assert!(same, "{name} depends on the tiling ({tiles} tiles, {threads} threads, {memory})");
+            assert!(same, "{name} depends on the tiling ({tiles} tiles, {threads} threads, {memory}, {:?})", sets[i]);
         }
         assert!(raster(&reference) == raster(&out), "grain_size.tif depends on the tiling");
         assert!(outlines(&reference) == outlines(&out), "grains.gpkg depends on the tiling");
     }
     let offset = [1_480_000.0, 5_250_000.0, 700.0];
-    let (far, _, _) = scene.run("far", &Work { tile_size_m: sizes_m[0], threads: 2, memory: "", offset });
+    let far = Work { tile_size_m: sizes_m[0], threads: 2, memory: "", instructions: Instructions::Auto, offset };
+    let (far, _, _) = scene.run("far", &far);
     only_moved(&reference, &far, offset);
     outcome
 }

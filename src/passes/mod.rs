@@ -13,6 +13,7 @@ pub use grains::Recipe;
 pub use per_vertex::CoreValues;
 pub use probe::Probe;
 
+use crate::curvature::InstructionSet;
 use crate::index::{CellBlock, Index};
 use crate::pipeline::OverBudget;
 use crate::store::StoreError;
@@ -25,6 +26,8 @@ pub struct Survey<'a> {
     pub index: &'a Index,
     /// How it is cut into tiles.
     pub plan: &'a Plan,
+    /// Vector instructions for the curvature; never change a result.
+    pub instructions: InstructionSet,
 }
 
 /// Why a tile is lost.

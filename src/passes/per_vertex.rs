@@ -1,7 +1,7 @@
 //! One number for every vertex: spacing and curvature.
 
 use super::{Survey, TileError};
-use crate::curvature::{Stencil, divergence, nearest_centroid_m};
+use crate::curvature::{Stencil, divergence_with, nearest_centroid_m_with};
 use crate::geometry::{DVec3, ExactSum};
 use crate::index::{CellBlock, Index};
 use crate::pipeline::{Crew, Interrupted, LostJob, Reservation, Stages, Stopped, over_jobs};
@@ -37,7 +37,8 @@ impl Survey<'_> {
     pub fn spacing(&self, crew: &Crew, progress: &dyn Progress) -> Result<(f64, Vec<LostJob>), Interrupted> {
         let side_m = self.index.scale.mean_triangle_area_m2.sqrt();
         let mut sum = ExactSum::ZERO;
-        let nearest = |field: &NormalField, points: &[DVec3]| nearest_centroid_m(field, points, side_m);
+        let nearest =
+            |field: &NormalField, points: &[DVec3]| nearest_centroid_m_with(field, points, side_m, self.instructions);
         let stages = Stages {
             footprint_bytes: |job| self.field_bytes(job, 3.0 * side_m),
             work: |job, reservation: &mut Reservation| {
@@ -72,7 +73,7 @@ impl Survey<'_> {
         progress: &dyn Progress,
         mut collect: impl FnMut(usize, CoreValues) -> Result<(), C>,
     ) -> Result<Vec<LostJob>, Stopped<C>> {
-        let values = |field: &NormalField, points: &[DVec3]| divergence(field, points, stencil);
+        let values = |field: &NormalField, points: &[DVec3]| divergence_with(field, points, stencil, self.instructions);
         let stages = Stages {
             footprint_bytes: |job| self.field_bytes(job, stencil.reach_m()),
             work: |job, reservation: &mut Reservation| {

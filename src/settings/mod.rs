@@ -187,6 +187,23 @@ pub struct WorkSettings {
     /// Memory for tiles in flight, as `2GiB`, `500MB` or bytes; empty for half of what is there.
     #[serde(deserialize_with = "load::size_text")]
     pub memory: String,
+    /// Vector instructions for the curvature: `auto` for the fastest that the processor has.
+    pub instructions: Instructions,
+}
+
+/// Vector instructions, as they are asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
+#[serde(rename_all = "lowercase")]
+pub enum Instructions {
+    /// The fastest that the processor has.
+    #[default]
+    Auto,
+    /// AVX-512.
+    Avx512,
+    /// AVX2.
+    Avx2,
+    /// None: plain Rust.
+    Scalar,
 }
 
 /// Which optional files are written.
