@@ -293,17 +293,21 @@ fn place(places: &mut Places, at: &[DVec3], group: &Group, offset_m: f64, per_m2
     places.scale = per_m2 as f32;
 }
 
-/// A bound on the error of ranks: coordinates are `f32` relative to cells, so that each difference of two is off by
-/// up to `each`, a distance by sqrt(3) times that, and its square (up to `complete_m`²) by twice that times the
-/// distance. The square is made of terms that add up to `sum`² at most, and rounded fourteen times.
+/// A bound on the error of the ranks of candidates as near as `complete_m`. Coordinates are rounded to `f32` relative to
+/// their own cell, to the block's and to the group's centre: each is off by up to `each`, a distance by sqrt(3) times
+/// that, and its square by twice that times the distance. The sum then made has the terms c², s² and 2 s·c, of a
+/// candidate no further than s + `complete_m` from the group's centre and a stencil point no further than s; nine, five
+/// and six roundings lie between them and the rank.
 #[inline(always)]
 fn error_in_ranks(job: &Job<'_>, size_m: f64, group: &Group, radius_m: f64, complete_m: f64) -> f64 {
-    let ulp = f64::from(f32::EPSILON) / 2.0;
-    let size = size_m + radius_m + job.grid.cell_m;
-    let each = ulp * 3.0 * (size + radius_m) + 8.0 * f64::EPSILON * (job.grid.magnitude_m() + size);
+    let ulp = 1.01 * f64::from(f32::EPSILON) / 2.0;
+    let in_block = size_m + radius_m;
+    let sizes = in_block.max(0.5 * job.grid.cell_m) + in_block + group.radius_m + radius_m;
+    let each = ulp * sizes + 8.0 * f64::EPSILON * (job.grid.magnitude_m() + in_block + job.grid.cell_m);
     let relative = each / complete_m;
-    let sum = (2.0 * group.radius_m + radius_m + job.weighting.offset_m) / complete_m;
-    COMPLETE * (relative * (3.5 + 3.0 * relative) + 14.0 * ulp * sum * sum)
+    let s = (group.radius_m + job.weighting.offset_m) / complete_m;
+    let c = s + 1.0;
+    COMPLETE * (relative * (3.5 + 3.0 * relative) + ulp * (9.0 * c * c + 5.0 * s * s + 12.0 * s * c))
 }
 
 /// Where a stencil point is: +x, -x, +y, -y, +z, -z.
