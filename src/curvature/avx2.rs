@@ -279,37 +279,46 @@ impl Lanes for Avx2 {
     fn count_between(self, keys: &Keys, at: &Row) -> (Row, Row, Row) {
         // SAFETY: `self` proves that the instructions are there.
         unsafe {
-            let one = _mm256_set1_epi16(1);
-            let at = load_row(at).map(|t| _mm256_add_epi16(t, one));
-            let (mut counts, mut below) = ([_mm256_setzero_si256(); 2], [_mm256_setzero_si256(); 2]);
-            let mut above = [_mm256_set1_epi16(i16::MAX); 2];
+            let at = load_row(at);
+            // How far ranks are below the threshold: as unsigned numbers, those above it are the largest.
+            let (mut beyond, mut least) = ([_mm256_setzero_si256(); 2], at);
+            let mut most = at.map(|t| _mm256_sub_epi16(t, _mm256_set1_epi16(i16::MAX)));
             for row in keys.rows() {
                 let rank = load_row(row);
                 for h in 0..2 {
-                    let within = _mm256_cmpgt_epi16(at[h], rank[h]);
-                    counts[h] = _mm256_sub_epi16(counts[h], within);
-                    below[h] = _mm256_max_epi16(below[h], _mm256_and_si256(rank[h], within));
-                    above[h] = _mm256_min_epu16(above[h], _mm256_or_si256(rank[h], within));
+                    let below = _mm256_sub_epi16(at[h], rank[h]);
+                    beyond[h] = _mm256_add_epi16(beyond[h], _mm256_srli_epi16::<15>(below));
+                    least[h] = _mm256_min_epu16(least[h], below);
+                    most[h] = _mm256_max_epu16(most[h], below);
                 }
             }
-            (row(counts), row(below), row(above.map(|a| _mm256_sub_epi16(a, one))))
+            let all = _mm256_set1_epi16(keys.rows().len() as i16);
+            let (mut below, mut above) = (at, at);
+            for h in 0..2 {
+                below[h] = _mm256_sub_epi16(at[h], least[h]);
+                above[h] = _mm256_sub_epi16(_mm256_sub_epi16(at[h], most[h]), _mm256_set1_epi16(1));
+            }
+            (row(beyond.map(|b| _mm256_sub_epi16(all, b))), row(below), row(above))
         }
     }
 
     #[inline(always)]
-    fn members(self, keys: &Keys, at: &Row, of: &mut [u32]) -> u32 {
+    fn members(self, keys: &Keys, at: &Row, of: &mut [u32]) -> (u32, Row) {
         // SAFETY: `self` proves that the instructions are there.
         unsafe {
             let at = load_row(at);
-            let mut equal = [_mm256_setzero_si256(); 2];
+            let (mut beyond, mut equal) = ([_mm256_setzero_si256(); 2], [_mm256_setzero_si256(); 2]);
             for (row, of) in keys.rows().iter().zip(of) {
                 let rank = load_row(row);
-                *of = !bits([_mm256_cmpgt_epi16(rank[0], at[0]), _mm256_cmpgt_epi16(rank[1], at[1])]);
+                let above = [_mm256_cmpgt_epi16(rank[0], at[0]), _mm256_cmpgt_epi16(rank[1], at[1])];
+                *of = !bits(above);
                 for h in 0..2 {
+                    beyond[h] = _mm256_sub_epi16(beyond[h], above[h]);
                     equal[h] = _mm256_or_si256(equal[h], _mm256_cmpeq_epi16(rank[h], at[h]));
                 }
             }
-            bits(equal)
+            let all = _mm256_set1_epi16(keys.rows().len() as i16);
+            (bits(equal), row(beyond.map(|b| _mm256_sub_epi16(all, b))))
         }
     }
 

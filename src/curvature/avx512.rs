@@ -137,6 +137,15 @@ unsafe fn row(lanes: __m512i) -> Row {
     row
 }
 
+/// 1 for what is negative, else 0. A comparison would go by way of a mask, at twice the cost.
+///
+/// SAFETY contract: AVX-512 BW is there.
+#[inline(always)]
+unsafe fn sign(lanes: __m512i) -> __m512i {
+    // SAFETY: by this function's contract.
+    unsafe { _mm512_srli_epi16::<15>(lanes) }
+}
+
 /// 32 numbers, every other four of them in a vector: packing two vectors puts them in order again.
 ///
 /// SAFETY contract: AVX-512 F is there.
@@ -235,13 +244,12 @@ impl Lanes for Avx512 {
     fn count(self, keys: &Keys, at: &Row) -> Row {
         // SAFETY: `self` proves that the instructions are there; a row is a whole vector.
         unsafe {
-            let (at, minus) = (load_row(at), _mm512_set1_epi16(-1));
-            let mut counts = _mm512_setzero_si512();
+            let at = load_row(at);
+            let mut beyond = _mm512_setzero_si512();
             for row in keys.rows() {
-                let within = _mm512_cmple_epi16_mask(load_row(row), at);
-                counts = _mm512_mask_sub_epi16(counts, within, counts, minus);
+                beyond = _mm512_add_epi16(beyond, sign(_mm512_sub_epi16(at, load_row(row))));
             }
-            row(counts)
+            row(_mm512_sub_epi16(_mm512_set1_epi16(keys.rows().len() as i16), beyond))
         }
     }
 
@@ -249,32 +257,36 @@ impl Lanes for Avx512 {
     fn count_between(self, keys: &Keys, at: &Row) -> (Row, Row, Row) {
         // SAFETY: `self` proves that the instructions are there; a row is a whole vector.
         unsafe {
-            let (at, minus) = (load_row(at), _mm512_set1_epi16(-1));
-            let (mut counts, mut below) = (_mm512_setzero_si512(), _mm512_setzero_si512());
-            let mut above = _mm512_set1_epi16(i16::MAX);
+            let at = load_row(at);
+            // How far ranks are below the threshold: as unsigned numbers, those above it are the largest.
+            let (mut beyond, mut least) = (_mm512_setzero_si512(), at);
+            let mut most = _mm512_sub_epi16(at, _mm512_set1_epi16(i16::MAX));
             for row in keys.rows() {
-                let rank = load_row(row);
-                let within = _mm512_cmple_epi16_mask(rank, at);
-                counts = _mm512_mask_sub_epi16(counts, within, counts, minus);
-                below = _mm512_mask_max_epi16(below, within, below, rank);
-                above = _mm512_mask_min_epi16(above, !within, above, rank);
+                let below = _mm512_sub_epi16(at, load_row(row));
+                beyond = _mm512_add_epi16(beyond, sign(below));
+                least = _mm512_min_epu16(least, below);
+                most = _mm512_max_epu16(most, below);
             }
-            (row(counts), row(below), row(_mm512_add_epi16(above, minus)))
+            let counts = _mm512_sub_epi16(_mm512_set1_epi16(keys.rows().len() as i16), beyond);
+            let above = _mm512_sub_epi16(_mm512_sub_epi16(at, most), _mm512_set1_epi16(1));
+            (row(counts), row(_mm512_sub_epi16(at, least)), row(above))
         }
     }
 
     #[inline(always)]
-    fn members(self, keys: &Keys, at: &Row, of: &mut [u32]) -> u32 {
+    fn members(self, keys: &Keys, at: &Row, of: &mut [u32]) -> (u32, Row) {
         // SAFETY: `self` proves that the instructions are there; a row is a whole vector.
         unsafe {
             let at = load_row(at);
-            let mut equal = 0;
+            let (mut beyond, mut least) = (_mm512_setzero_si512(), _mm512_set1_epi16(-1));
             for (row, of) in keys.rows().iter().zip(of) {
-                let rank = load_row(row);
-                *of = _mm512_cmple_epi16_mask(rank, at);
-                equal |= _mm512_cmpeq_epi16_mask(rank, at);
+                let below = _mm512_sub_epi16(at, load_row(row));
+                *of = !_mm512_movepi16_mask(below);
+                beyond = _mm512_add_epi16(beyond, sign(below));
+                least = _mm512_min_epu16(least, below);
             }
-            equal
+            let counts = _mm512_sub_epi16(_mm512_set1_epi16(keys.rows().len() as i16), beyond);
+            (_mm512_testn_epi16_mask(least, least), row(counts))
         }
     }
 

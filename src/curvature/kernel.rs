@@ -201,7 +201,7 @@ fn together<L: Lanes>(lanes: L, column: &mut Column<'_, '_>, block: &Block, queu
     let group = Group::around(at);
     let mut radius_m = work.radius_m.min(reach_m);
     let mut thresholds = Row([0; LANES]);
-    let per_m2 = loop {
+    let (per_m2, equal) = loop {
         group.narrow(lanes, &work.block, &mut work.list, (radius_m, offset_m));
         let n = work.list.len;
         if n > MOST || radius_m > 1e3 * job.grid.cell_m {
@@ -219,8 +219,8 @@ fn together<L: Lanes>(lanes: L, column: &mut Column<'_, '_>, block: &Block, queu
             for (l, t) in thresholds.0.iter_mut().enumerate() {
                 *t = guess[l % 6];
             }
-            if search(lanes, &work.keys, k as i32, &mut thresholds) {
-                break per_m2;
+            if let Some(equal) = search(lanes, &work.keys, k as i16, &mut thresholds, &mut work.of[..n]) {
+                break (per_m2, equal);
             }
         }
         if radius_m >= reach_m {
@@ -229,7 +229,6 @@ fn together<L: Lanes>(lanes: L, column: &mut Column<'_, '_>, block: &Block, queu
         radius_m = (1.15 * radius_m).min(reach_m);
     };
     let n = work.list.len;
-    let equal = lanes.members(&work.keys, &thresholds, &mut work.of[..n]);
     work.of[n..n + SLACK].fill(0);
     let m2_per = 1.0 / per_m2;
     work.last_m2 = [0.0; 6];

@@ -133,8 +133,8 @@ pub(super) trait Lanes: Copy + Send + Sync {
     fn count_between(self, keys: &Keys, at: &Row) -> (Row, Row, Row);
 
     /// For each candidate, the stencil points where it ranks no higher than the threshold; and those where some
-    /// candidate ranks the same.
-    fn members(self, keys: &Keys, at: &Row, of: &mut [u32]) -> u32;
+    /// candidate ranks the same; and how many rank no higher.
+    fn members(self, keys: &Keys, at: &Row, of: &mut [u32]) -> (u32, Row);
 
     /// Chooses the candidates that belong to a stencil point in `bits`. From the last one on, `of` has `SLACK` zeros.
     fn choose(self, points: &Points, of: &[u32], bits: u32, near: &mut Near);
@@ -253,7 +253,7 @@ impl Lanes for Plain {
     }
 
     #[inline(always)]
-    fn members(self, keys: &Keys, at: &Row, of: &mut [u32]) -> u32 {
+    fn members(self, keys: &Keys, at: &Row, of: &mut [u32]) -> (u32, Row) {
         let mut equal = 0;
         for (row, of) in keys.rows().iter().zip(of) {
             *of = 0;
@@ -262,7 +262,7 @@ impl Lanes for Plain {
                 equal |= u32::from(row.0[l] == at.0[l]) << l;
             }
         }
-        equal
+        (equal, self.count(keys, at))
     }
 
     #[inline(always)]
