@@ -4,7 +4,7 @@
 
 use super::buffer::Points;
 use super::lanes::{IN_ORDER, Keys, Lanes, MOST, Near, Places, Row, fetch};
-use super::weights::{FIRST, GUESS, ROUND, SECOND, Sum, Weighting, surplus};
+use super::weights::{FIRST, GUESS, ROUND, SECOND, Sums, Weighting, surplus};
 use super::{kernel, nearest};
 use crate::geometry::DVec3;
 use crate::tile::NormalField;
@@ -349,13 +349,9 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn fetch(self, field: &NormalField, vertex: DVec3, near: &mut Near) {
+    fn sums(self, field: &NormalField, vertex: DVec3, near: &mut Near, weighting: &Weighting) -> Sums {
         fetch(field, vertex, near);
-    }
-
-    #[inline(always)]
-    fn sums(self, near: &Near, weighting: &Weighting, neighbours: usize) -> [Sum; 6] {
-        let mut result = [Sum::default(); 6];
+        let mut result = Sums::default();
         assert!(
             near.len <= MOST && near.value.len() >= 6 * MOST && near.of.len() >= MOST,
             "whole vectors of neighbours"
@@ -367,7 +363,7 @@ impl Lanes for Avx2 {
             let offset = _mm256_set1_pd(weighting.offset_m);
             let (least, scale) = (_mm256_set1_pd(weighting.least_m2), _mm256_set1_pd(weighting.scale));
             let round = _mm256_set1_pd(ROUND);
-            let surplus = surplus(neighbours);
+            let surplus = surplus(near.len.next_multiple_of(4));
             // One axis at a time, since the registers hold no more.
             for axis in 0..3 {
                 let mut sums = [[_mm256_setzero_si256(); 2]; 2];
@@ -383,23 +379,21 @@ impl Lanes for Avx2 {
                         let bit = _mm256_set1_epi64x(1 << (near.shift + 2 * axis + side));
                         let belongs = _mm256_cmpeq_epi64(_mm256_and_si256(of, bit), bit);
                         let a = if side == 0 { _mm256_sub_pd(u, offset) } else { _mm256_add_pd(u, offset) };
-                        let w = weight(a, rest, least, scale);
+                        let w = _mm256_and_pd(weight(a, rest, least, scale), _mm256_castsi256_pd(belongs));
                         let weighted = _mm256_castpd_si256(_mm256_add_pd(_mm256_mul_pd(w, normal), round));
                         let weights = _mm256_castpd_si256(_mm256_add_pd(w, round));
                         let [sum_n, sum] = sums[side];
                         sums[side] = [
-                            _mm256_add_epi64(sum_n, _mm256_and_si256(weighted, belongs)),
-                            _mm256_add_epi64(sum, _mm256_and_si256(weights, belongs)),
+                            _mm256_add_epi64(sum_n, weighted),
+                            _mm256_add_epi64(sum, weights),
                         ];
                     }
                     i += 4;
                 }
                 for side in 0..2 {
                     let q = 2 * axis + side;
-                    result[q] = Sum {
-                        weighted: total(sums[side][0]).wrapping_sub(surplus),
-                        weights: total(sums[side][1]).wrapping_sub(surplus),
-                    };
+                    result.weighted[q] = total(sums[side][0]).wrapping_sub(surplus);
+                    result.weights[q] = total(sums[side][1]).wrapping_sub(surplus);
                 }
             }
         }

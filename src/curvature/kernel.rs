@@ -19,7 +19,7 @@ use super::grid::Grid;
 use super::lanes::{Keys, LANES, Lanes, MOST, Near, Places, Row, TOGETHER};
 use super::neighbours::Reserve;
 use super::thresholds::{COMPLETE, HIGHEST, search, undecided};
-use super::weights::{Sum, Weighting, divergence_of};
+use super::weights::Weighting;
 use crate::geometry::DVec3;
 use crate::tile::NormalField;
 
@@ -256,8 +256,7 @@ fn together<L: Lanes>(lanes: L, column: &mut Column<'_, '_>, block: &Block, queu
             lanes.choose(&work.list, &work.of[..n + SLACK], 63 << (6 * v), &mut work.near);
             let end = work.near.len;
             work.near.of[end..end + 8].fill(0);
-            lanes.fetch(job.field, p, &mut work.near);
-            Some(divergence_of(&lanes.sums(&work.near, &job.weighting, k), offset_m))
+            Some(lanes.sums(job.field, p, &mut work.near, &job.weighting).divergence(offset_m))
         } else {
             None
         };
@@ -349,15 +348,4 @@ fn certain(job: &Job<'_>, work: &Workspace, p: DVec3, v: usize) -> bool {
             .fold(0.0, f64::max);
         farthest.sqrt() < job.field.loaded.margin_m(place)
     })
-}
-
-/// The sum of one stencil point's neighbours.
-pub(super) fn sum_of(field: &NormalField, found: &[(f64, u32)], p: DVec3, q: usize, weighting: &Weighting) -> Sum {
-    let side = if q.is_multiple_of(2) { 1.0 } else { -1.0 };
-    let mut sum = Sum::default();
-    for &(_, t) in found {
-        let u = field.centroids[t as usize] - p;
-        sum.add(weighting.weight(weighting.distance2(u, q / 2, side)), field.normals[t as usize][q / 2]);
-    }
-    sum
 }

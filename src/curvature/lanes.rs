@@ -5,7 +5,7 @@
 #![allow(clippy::needless_range_loop, reason = "stencil points and axes run through several arrays at once")]
 
 use super::buffer::{Aligned, Points, SLACK};
-use super::weights::{Sum, Weighting};
+use super::weights::{Sums, Weighting};
 use crate::geometry::DVec3;
 use crate::tile::NormalField;
 
@@ -139,11 +139,8 @@ pub(super) trait Lanes: Copy + Send + Sync {
     /// Chooses the candidates that belong to a stencil point in `bits`. From the last one on, `of` has `SLACK` zeros.
     fn choose(self, points: &Points, of: &[u32], bits: u32, near: &mut Near);
 
-    /// Fetches offsets from a vertex and normals of the numbered triangles.
-    fn fetch(self, field: &NormalField, vertex: DVec3, near: &mut Near);
-
-    /// Sums at the six stencil points, with as many neighbours each.
-    fn sums(self, near: &Near, weighting: &Weighting, neighbours: usize) -> [Sum; 6];
+    /// Sums at the six stencil points of a vertex. From the last one on, `near.of` has eight zeros.
+    fn sums(self, field: &NormalField, vertex: DVec3, near: &mut Near, weighting: &Weighting) -> Sums;
 }
 
 /// Plain Rust, for any processor.
@@ -170,7 +167,7 @@ fn keep(all: &Points, kept: &mut Points, limit: f32, relative: [f32; 3], distanc
     kept.len = n;
 }
 
-/// [`Lanes::fetch`], one by one.
+/// Offsets from a vertex and normals of the numbered triangles.
 #[inline(always)]
 pub(super) fn fetch(field: &NormalField, vertex: DVec3, near: &mut Near) {
     let value: &mut [f64] = &mut near.value;
@@ -277,13 +274,9 @@ impl Lanes for Plain {
     }
 
     #[inline(always)]
-    fn fetch(self, field: &NormalField, vertex: DVec3, near: &mut Near) {
+    fn sums(self, field: &NormalField, vertex: DVec3, near: &mut Near, weighting: &Weighting) -> Sums {
         fetch(field, vertex, near);
-    }
-
-    #[inline(always)]
-    fn sums(self, near: &Near, weighting: &Weighting, _: usize) -> [Sum; 6] {
-        let mut sums = [Sum::default(); 6];
+        let mut sums = Sums::default();
         let value = |k: usize| &near.value[k * MOST..k * MOST + near.len];
         for q in 0..6usize {
             let side = if q.is_multiple_of(2) { weighting.offset_m } else { -weighting.offset_m };
@@ -297,7 +290,7 @@ impl Lanes for Plain {
                 weights = weights.wrapping_add(super::weights::rounded(weight) & belongs);
                 weighted = weighted.wrapping_add(super::weights::rounded(weight * n[i]) & belongs);
             }
-            sums[q] = Sum { weighted, weights };
+            (sums.weighted[q], sums.weights[q]) = (weighted, weights);
         }
         sums
     }
