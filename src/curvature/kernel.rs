@@ -216,9 +216,10 @@ fn together<L: Lanes>(lanes: L, column: &mut Column<'_, '_>, block: &Block, queu
             place(&mut work.places, at, &group, offset_m, per_m2);
             lanes.rank(&work.list, &work.places, &mut work.keys);
             let guess = work.last_m2.map(|m2| (m2 * per_m2).min(f64::from(HIGHEST)) as i16);
-            for (l, t) in thresholds.0.iter_mut().enumerate() {
-                *t = guess[l % 6];
+            for v in 0..TOGETHER {
+                thresholds.0[6 * v..6 * v + 6].copy_from_slice(&guess);
             }
+            thresholds.0[6 * TOGETHER..].copy_from_slice(&guess[..LANES - 6 * TOGETHER]);
             if let Some(equal) = search(lanes, &work.keys, k as i16, &mut thresholds, &mut work.of[..n]) {
                 break (per_m2, equal);
             }
@@ -231,15 +232,14 @@ fn together<L: Lanes>(lanes: L, column: &mut Column<'_, '_>, block: &Block, queu
     let n = work.list.len;
     work.of[n..n + SLACK].fill(0);
     let m2_per = 1.0 / per_m2;
-    work.last_m2 = [0.0; 6];
-    let share = m2_per / queue.len() as f64;
+    let mut total = [0i32; 6];
     let mut farthest = 0;
     for (v, e) in queue.iter().enumerate() {
         let p = point(e);
         let own = &thresholds.0[6 * v..6 * v + 6];
         let mut highest = 0;
-        for (t, m2) in own.iter().zip(&mut work.last_m2) {
-            *m2 += (f64::from(*t) + 0.5) * share;
+        for (t, total) in own.iter().zip(&mut total) {
+            *total += i32::from(*t);
             highest = highest.max(*t);
         }
         farthest = farthest.max(highest);
@@ -261,6 +261,8 @@ fn together<L: Lanes>(lanes: L, column: &mut Column<'_, '_>, block: &Block, queu
             None
         };
     }
+    let share = m2_per / queue.len() as f64;
+    work.last_m2 = total.map(|t| (f64::from(t) + 0.5) * share);
     work.radius_m = SPARE * (((f64::from(farthest) + 1.5) * m2_per).sqrt() + offset_m);
     Outcome::Known
 }
@@ -272,21 +274,20 @@ fn place(places: &mut Places, at: &[DVec3], group: &Group, offset_m: f64, per_m2
     let (shift, scale) = ((-2.0 * per_m2 * offset_m) as f32, -2.0 * per_m2);
     for v in 0..TOGETHER {
         let u = at[if v < at.len() { v } else { 0 }] - centre;
-        let (a, b) = ((u * scale).as_vec3(), per_m2 * (u.length_squared() + offset_m * offset_m));
-        let b_shift = u * (2.0 * per_m2 * offset_m);
+        let a = (u * scale).as_vec3();
+        let (b, c) = (per_m2 * (u.length_squared() + offset_m * offset_m), u * (2.0 * per_m2 * offset_m));
+        // Eight lanes at a time; the next vertex mends the last two.
+        let square = [c.x, -c.x, c.y, -c.y, c.z, -c.z, 0.0, 0.0];
+        places.b[6 * v..6 * v + 8].copy_from_slice(&square.map(|c| (b + c) as f32));
         for axis in 0..3 {
-            places.a[axis][6 * v..6 * v + 6].fill(a[axis]);
-            places.a[axis][6 * v + 2 * axis] = a[axis] + shift;
-            places.a[axis][6 * v + 2 * axis + 1] = a[axis] - shift;
-            places.b[6 * v + 2 * axis] = (b + b_shift[axis]) as f32;
-            places.b[6 * v + 2 * axis + 1] = (b - b_shift[axis]) as f32;
+            let mut own = [a[axis]; 8];
+            own[2 * axis] += shift;
+            own[2 * axis + 1] -= shift;
+            places.a[axis][6 * v..6 * v + 8].copy_from_slice(&own);
         }
     }
-    for l in 6 * TOGETHER..LANES {
-        for axis in 0..3 {
-            places.a[axis][l] = places.a[axis][l % 6];
-        }
-        places.b[l] = places.b[l % 6];
+    for lanes in places.a.iter_mut().chain([&mut places.b]) {
+        lanes.copy_within(0..LANES - 6 * TOGETHER, 6 * TOGETHER);
     }
     places.scale = per_m2 as f32;
 }
