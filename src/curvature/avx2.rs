@@ -99,15 +99,14 @@ unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], half: [f32; 3]
             if all.len - i < 8 {
                 mask &= (1 << (all.len - i)) - 1;
             }
-            if mask != 0 {
-                let order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(IN_ORDER[mask] as i64));
-                _mm256_storeu_ps(kx.add(n), _mm256_permutevar8x32_ps(x, order));
-                _mm256_storeu_ps(ky.add(n), _mm256_permutevar8x32_ps(y, order));
-                _mm256_storeu_ps(kz.add(n), _mm256_permutevar8x32_ps(z, order));
-                let id = _mm256_permutevar8x32_epi32(_mm256_loadu_si256(ids.add(i).cast()), order);
-                _mm256_storeu_si256(kid.add(n).cast(), id);
-                n += mask.count_ones() as usize;
-            }
+            // Even where none is kept: a branch would often be guessed wrong.
+            let order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(IN_ORDER[mask] as i64));
+            _mm256_storeu_ps(kx.add(n), _mm256_permutevar8x32_ps(x, order));
+            _mm256_storeu_ps(ky.add(n), _mm256_permutevar8x32_ps(y, order));
+            _mm256_storeu_ps(kz.add(n), _mm256_permutevar8x32_ps(z, order));
+            let id = _mm256_permutevar8x32_epi32(_mm256_loadu_si256(ids.add(i).cast()), order);
+            _mm256_storeu_si256(kid.add(n).cast(), id);
+            n += mask.count_ones() as usize;
             i += 8;
         }
     }
@@ -383,10 +382,7 @@ impl Lanes for Avx2 {
                         let weighted = _mm256_castpd_si256(_mm256_add_pd(_mm256_mul_pd(w, normal), round));
                         let weights = _mm256_castpd_si256(_mm256_add_pd(w, round));
                         let [sum_n, sum] = sums[side];
-                        sums[side] = [
-                            _mm256_add_epi64(sum_n, weighted),
-                            _mm256_add_epi64(sum, weights),
-                        ];
+                        sums[side] = [_mm256_add_epi64(sum_n, weighted), _mm256_add_epi64(sum, weights)];
                     }
                     i += 4;
                 }

@@ -94,14 +94,13 @@ unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], half: [f32; 3]
             if all.len - i < 16 {
                 mask &= (1 << (all.len - i)) - 1;
             }
-            if mask != 0 {
-                _mm512_storeu_ps(kx.add(n), _mm512_maskz_compress_ps(mask, x));
-                _mm512_storeu_ps(ky.add(n), _mm512_maskz_compress_ps(mask, y));
-                _mm512_storeu_ps(kz.add(n), _mm512_maskz_compress_ps(mask, z));
-                let id = _mm512_maskz_compress_epi32(mask, _mm512_loadu_si512(ids.add(i).cast()));
-                _mm512_storeu_si512(kid.add(n).cast(), id);
-                n += mask.count_ones() as usize;
-            }
+            // Even where none is kept: a branch would often be guessed wrong.
+            _mm512_storeu_ps(kx.add(n), _mm512_maskz_compress_ps(mask, x));
+            _mm512_storeu_ps(ky.add(n), _mm512_maskz_compress_ps(mask, y));
+            _mm512_storeu_ps(kz.add(n), _mm512_maskz_compress_ps(mask, z));
+            let id = _mm512_maskz_compress_epi32(mask, _mm512_loadu_si512(ids.add(i).cast()));
+            _mm512_storeu_si512(kid.add(n).cast(), id);
+            n += mask.count_ones() as usize;
             i += 16;
         }
     }

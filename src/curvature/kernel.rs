@@ -1,7 +1,7 @@
 //! The divergence at all vertices of a column of cells, with the work shared.
 //!
-//! The candidates around a cell are gathered once. Up to five vertices next to one another (3.7 on average, counted on a
-//! bed of 481,851) share a narrower list of about 90, which reaches as far as the vertices before needed and some more.
+//! The candidates around a cell are gathered once. Up to five vertices next to one another (4.3 on average, counted on a
+//! bed of 481,851) share a narrower list of about 100, which reaches as far as the vertices before needed and some more.
 //! Ranks at all thirty stencil points at once ([`super::thresholds`]) give the sets of neighbours, and only these, about
 //! 42 for a vertex, are fetched in `f64` and weighted ([`super::weights`]).
 //!

@@ -61,12 +61,12 @@ impl Keys {
     }
 }
 
-/// Neighbours of at least one stencil point of a vertex, exactly: offsets from the vertex and normals.
+/// Neighbours of at least one stencil point of a vertex.
 #[derive(Debug)]
 pub(super) struct Near {
     /// Local triangle numbers.
     pub(super) id: Aligned<u32>,
-    /// x, y, z of the offset (metres) and of the normal, `MOST` each.
+    /// Place for x, y, z of the offset (metres) and of the normal, `MOST` each.
     pub(super) value: Aligned<f64>,
     /// Which stencil points they belong to: bit `shift` + q for point q.
     pub(super) of: Aligned<u32>,
@@ -167,7 +167,7 @@ fn keep(all: &Points, kept: &mut Points, limit: f32, relative: [f32; 3], distanc
     kept.len = n;
 }
 
-/// Offsets from a vertex and normals of the numbered triangles.
+/// Offsets from a vertex and normals of the numbered triangles; then zeros, to the end of a vector.
 #[inline(always)]
 pub(super) fn fetch(field: &NormalField, vertex: DVec3, near: &mut Near) {
     let value: &mut [f64] = &mut near.value;
@@ -180,6 +180,10 @@ pub(super) fn fetch(field: &NormalField, vertex: DVec3, near: &mut Near) {
         let (u, normal) = (field.centroids[t as usize] - vertex, field.normals[t as usize]);
         (x[i], y[i], z[i]) = (u.x, u.y, u.z);
         (nx[i], ny[i], nz[i]) = (normal.x, normal.y, normal.z);
+    }
+    for normal in [nx, ny, nz] {
+        let end = near.len.next_multiple_of(4);
+        normal[near.len..end].fill(0.0);
     }
 }
 

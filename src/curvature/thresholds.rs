@@ -1,7 +1,7 @@
 //! The `k` nearest candidates of many stencil points at once, without sorting.
 //!
 //! Candidates are ranked by squared distance cut to 15 bits. A row holds one candidate's ranks at 32 stencil points, so
-//! that vectors run over the points: a count at all of them is one comparison and one subtraction for each candidate.
+//! that vectors run over the points: a count at all of them is two or three instructions for each candidate.
 //! A threshold that exactly `k` ranks do not exceed gives the set. On a surface the count grows in proportion to the
 //! squared distance, so interpolation between counts comes close in a few rounds, and all searches share their rounds.
 //! The last steps go from rank to rank.
