@@ -4,7 +4,7 @@
 
 use super::buffer::Points;
 use super::lanes::{IN_ORDER, Keys, Lanes, MOST, Near, Places, Row, fetch};
-use super::weights::{FIRST, GUESS, ROUND, SECOND, Sum, Weighting, surplus};
+use super::weights::{FIRST, GUESS, ROUND, SECOND, Sums, Weighting, surplus};
 use super::{kernel, nearest};
 use crate::geometry::DVec3;
 use crate::tile::NormalField;
@@ -99,15 +99,14 @@ unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], half: [f32; 3]
             if all.len - i < 8 {
                 mask &= (1 << (all.len - i)) - 1;
             }
-            if mask != 0 {
-                let order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(IN_ORDER[mask] as i64));
-                _mm256_storeu_ps(kx.add(n), _mm256_permutevar8x32_ps(x, order));
-                _mm256_storeu_ps(ky.add(n), _mm256_permutevar8x32_ps(y, order));
-                _mm256_storeu_ps(kz.add(n), _mm256_permutevar8x32_ps(z, order));
-                let id = _mm256_permutevar8x32_epi32(_mm256_loadu_si256(ids.add(i).cast()), order);
-                _mm256_storeu_si256(kid.add(n).cast(), id);
-                n += mask.count_ones() as usize;
-            }
+            // Even where none is kept: a branch would often be guessed wrong.
+            let order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(IN_ORDER[mask] as i64));
+            _mm256_storeu_ps(kx.add(n), _mm256_permutevar8x32_ps(x, order));
+            _mm256_storeu_ps(ky.add(n), _mm256_permutevar8x32_ps(y, order));
+            _mm256_storeu_ps(kz.add(n), _mm256_permutevar8x32_ps(z, order));
+            let id = _mm256_permutevar8x32_epi32(_mm256_loadu_si256(ids.add(i).cast()), order);
+            _mm256_storeu_si256(kid.add(n).cast(), id);
+            n += mask.count_ones() as usize;
             i += 8;
         }
     }
@@ -279,37 +278,46 @@ impl Lanes for Avx2 {
     fn count_between(self, keys: &Keys, at: &Row) -> (Row, Row, Row) {
         // SAFETY: `self` proves that the instructions are there.
         unsafe {
-            let one = _mm256_set1_epi16(1);
-            let at = load_row(at).map(|t| _mm256_add_epi16(t, one));
-            let (mut counts, mut below) = ([_mm256_setzero_si256(); 2], [_mm256_setzero_si256(); 2]);
-            let mut above = [_mm256_set1_epi16(i16::MAX); 2];
+            let at = load_row(at);
+            // How far ranks are below the threshold: as unsigned numbers, those above it are the largest.
+            let (mut beyond, mut least) = ([_mm256_setzero_si256(); 2], at);
+            let mut most = at.map(|t| _mm256_sub_epi16(t, _mm256_set1_epi16(i16::MAX)));
             for row in keys.rows() {
                 let rank = load_row(row);
                 for h in 0..2 {
-                    let within = _mm256_cmpgt_epi16(at[h], rank[h]);
-                    counts[h] = _mm256_sub_epi16(counts[h], within);
-                    below[h] = _mm256_max_epi16(below[h], _mm256_and_si256(rank[h], within));
-                    above[h] = _mm256_min_epu16(above[h], _mm256_or_si256(rank[h], within));
+                    let below = _mm256_sub_epi16(at[h], rank[h]);
+                    beyond[h] = _mm256_add_epi16(beyond[h], _mm256_srli_epi16::<15>(below));
+                    least[h] = _mm256_min_epu16(least[h], below);
+                    most[h] = _mm256_max_epu16(most[h], below);
                 }
             }
-            (row(counts), row(below), row(above.map(|a| _mm256_sub_epi16(a, one))))
+            let all = _mm256_set1_epi16(keys.rows().len() as i16);
+            let (mut below, mut above) = (at, at);
+            for h in 0..2 {
+                below[h] = _mm256_sub_epi16(at[h], least[h]);
+                above[h] = _mm256_sub_epi16(_mm256_sub_epi16(at[h], most[h]), _mm256_set1_epi16(1));
+            }
+            (row(beyond.map(|b| _mm256_sub_epi16(all, b))), row(below), row(above))
         }
     }
 
     #[inline(always)]
-    fn members(self, keys: &Keys, at: &Row, of: &mut [u32]) -> u32 {
+    fn members(self, keys: &Keys, at: &Row, of: &mut [u32]) -> (u32, Row) {
         // SAFETY: `self` proves that the instructions are there.
         unsafe {
             let at = load_row(at);
-            let mut equal = [_mm256_setzero_si256(); 2];
+            let (mut beyond, mut equal) = ([_mm256_setzero_si256(); 2], [_mm256_setzero_si256(); 2]);
             for (row, of) in keys.rows().iter().zip(of) {
                 let rank = load_row(row);
-                *of = !bits([_mm256_cmpgt_epi16(rank[0], at[0]), _mm256_cmpgt_epi16(rank[1], at[1])]);
+                let above = [_mm256_cmpgt_epi16(rank[0], at[0]), _mm256_cmpgt_epi16(rank[1], at[1])];
+                *of = !bits(above);
                 for h in 0..2 {
+                    beyond[h] = _mm256_sub_epi16(beyond[h], above[h]);
                     equal[h] = _mm256_or_si256(equal[h], _mm256_cmpeq_epi16(rank[h], at[h]));
                 }
             }
-            bits(equal)
+            let all = _mm256_set1_epi16(keys.rows().len() as i16);
+            (bits(equal), row(beyond.map(|b| _mm256_sub_epi16(all, b))))
         }
     }
 
@@ -340,13 +348,9 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn fetch(self, field: &NormalField, vertex: DVec3, near: &mut Near) {
+    fn sums(self, field: &NormalField, vertex: DVec3, near: &mut Near, weighting: &Weighting) -> Sums {
         fetch(field, vertex, near);
-    }
-
-    #[inline(always)]
-    fn sums(self, near: &Near, weighting: &Weighting, neighbours: usize) -> [Sum; 6] {
-        let mut result = [Sum::default(); 6];
+        let mut result = Sums::default();
         assert!(
             near.len <= MOST && near.value.len() >= 6 * MOST && near.of.len() >= MOST,
             "whole vectors of neighbours"
@@ -358,7 +362,7 @@ impl Lanes for Avx2 {
             let offset = _mm256_set1_pd(weighting.offset_m);
             let (least, scale) = (_mm256_set1_pd(weighting.least_m2), _mm256_set1_pd(weighting.scale));
             let round = _mm256_set1_pd(ROUND);
-            let surplus = surplus(neighbours);
+            let surplus = surplus(near.len.next_multiple_of(4));
             // One axis at a time, since the registers hold no more.
             for axis in 0..3 {
                 let mut sums = [[_mm256_setzero_si256(); 2]; 2];
@@ -374,23 +378,18 @@ impl Lanes for Avx2 {
                         let bit = _mm256_set1_epi64x(1 << (near.shift + 2 * axis + side));
                         let belongs = _mm256_cmpeq_epi64(_mm256_and_si256(of, bit), bit);
                         let a = if side == 0 { _mm256_sub_pd(u, offset) } else { _mm256_add_pd(u, offset) };
-                        let w = weight(a, rest, least, scale);
+                        let w = _mm256_and_pd(weight(a, rest, least, scale), _mm256_castsi256_pd(belongs));
                         let weighted = _mm256_castpd_si256(_mm256_add_pd(_mm256_mul_pd(w, normal), round));
                         let weights = _mm256_castpd_si256(_mm256_add_pd(w, round));
                         let [sum_n, sum] = sums[side];
-                        sums[side] = [
-                            _mm256_add_epi64(sum_n, _mm256_and_si256(weighted, belongs)),
-                            _mm256_add_epi64(sum, _mm256_and_si256(weights, belongs)),
-                        ];
+                        sums[side] = [_mm256_add_epi64(sum_n, weighted), _mm256_add_epi64(sum, weights)];
                     }
                     i += 4;
                 }
                 for side in 0..2 {
                     let q = 2 * axis + side;
-                    result[q] = Sum {
-                        weighted: total(sums[side][0]).wrapping_sub(surplus),
-                        weights: total(sums[side][1]).wrapping_sub(surplus),
-                    };
+                    result.weighted[q] = total(sums[side][0]).wrapping_sub(surplus);
+                    result.weights[q] = total(sums[side][1]).wrapping_sub(surplus);
                 }
             }
         }

@@ -4,7 +4,7 @@
 
 use super::buffer::Points;
 use super::lanes::{Keys, Lanes, MOST, Near, Places, Row};
-use super::weights::{FIRST, GUESS, ROUND, SECOND, Sum, Weighting, surplus};
+use super::weights::{FIRST, GUESS, ROUND, SECOND, Sums, Weighting, surplus};
 use super::{kernel, nearest};
 use crate::geometry::DVec3;
 use crate::tile::NormalField;
@@ -48,15 +48,6 @@ fn nearest_run(lanes: Avx512, run: &mut nearest::Run<'_, '_>) {
 unsafe fn load(from: *const f32, i: usize) -> __m512 {
     // SAFETY: by this function's contract.
     unsafe { _mm512_loadu_ps(from.add(i)) }
-}
-
-/// Eight numbers from `i` on.
-///
-/// SAFETY contract: AVX-512 F is there, and so are the numbers.
-#[inline(always)]
-unsafe fn load_f64(from: *const f64, i: usize) -> __m512d {
-    // SAFETY: by this function's contract.
-    unsafe { _mm512_loadu_pd(from.add(i)) }
 }
 
 /// Squared distance as [`Lanes::keep_near_box`] has it, from a box around the origin.
@@ -103,14 +94,13 @@ unsafe fn keep(all: &Points, kept: &mut Points, origin: [f32; 3], half: [f32; 3]
             if all.len - i < 16 {
                 mask &= (1 << (all.len - i)) - 1;
             }
-            if mask != 0 {
-                _mm512_storeu_ps(kx.add(n), _mm512_maskz_compress_ps(mask, x));
-                _mm512_storeu_ps(ky.add(n), _mm512_maskz_compress_ps(mask, y));
-                _mm512_storeu_ps(kz.add(n), _mm512_maskz_compress_ps(mask, z));
-                let id = _mm512_maskz_compress_epi32(mask, _mm512_loadu_si512(ids.add(i).cast()));
-                _mm512_storeu_si512(kid.add(n).cast(), id);
-                n += mask.count_ones() as usize;
-            }
+            // Even where none is kept: a branch would often be guessed wrong.
+            _mm512_storeu_ps(kx.add(n), _mm512_maskz_compress_ps(mask, x));
+            _mm512_storeu_ps(ky.add(n), _mm512_maskz_compress_ps(mask, y));
+            _mm512_storeu_ps(kz.add(n), _mm512_maskz_compress_ps(mask, z));
+            let id = _mm512_maskz_compress_epi32(mask, _mm512_loadu_si512(ids.add(i).cast()));
+            _mm512_storeu_si512(kid.add(n).cast(), id);
+            n += mask.count_ones() as usize;
             i += 16;
         }
     }
@@ -137,6 +127,15 @@ unsafe fn row(lanes: __m512i) -> Row {
     row
 }
 
+/// 1 for what is negative, else 0. A comparison would go by way of a mask, at twice the cost.
+///
+/// SAFETY contract: AVX-512 BW is there.
+#[inline(always)]
+unsafe fn sign(lanes: __m512i) -> __m512i {
+    // SAFETY: by this function's contract.
+    unsafe { _mm512_srli_epi16::<15>(lanes) }
+}
+
 /// 32 numbers, every other four of them in a vector: packing two vectors puts them in order again.
 ///
 /// SAFETY contract: AVX-512 F is there.
@@ -149,11 +148,11 @@ unsafe fn quarters(of: &[f32; 32]) -> [__m512; 2] {
     }
 }
 
-/// [`Weighting::weight`] of a² + rest.
+/// [`Weighting::weight`] of a² + rest, 0 for what does not belong.
 ///
 /// SAFETY contract: the instructions are there.
 #[inline(always)]
-unsafe fn weight(a: __m512d, rest: __m512d, least: __m512d, scale: __m512d) -> __m512d {
+unsafe fn weight(belongs: __mmask8, a: __m512d, rest: __m512d, least: __m512d, scale: __m512d) -> __m512d {
     // SAFETY: the instructions are there by this function's contract.
     unsafe {
         let d2 = _mm512_add_pd(_mm512_mul_pd(a, a), rest);
@@ -167,7 +166,25 @@ unsafe fn weight(a: __m512d, rest: __m512d, least: __m512d, scale: __m512d) -> _
         let tail = _mm512_add_pd(_mm512_set1_pd(SECOND[1]), _mm512_mul_pd(e, tail));
         let tail = _mm512_add_pd(_mm512_set1_pd(SECOND[0]), _mm512_mul_pd(e, tail));
         let y = _mm512_mul_pd(y, scale);
-        _mm512_add_pd(y, _mm512_mul_pd(_mm512_mul_pd(y, e), tail))
+        _mm512_maskz_add_pd(belongs, y, _mm512_mul_pd(_mm512_mul_pd(y, e), tail))
+    }
+}
+
+/// The sums over each of six vectors, the last two twice.
+///
+/// SAFETY contract: AVX-512 F is there.
+#[inline(always)]
+unsafe fn totals(of: [__m512i; 6]) -> __m512i {
+    // SAFETY: by this function's contract.
+    unsafe {
+        let pair = |a, b| _mm512_add_epi64(_mm512_unpacklo_epi64(a, b), _mm512_unpackhi_epi64(a, b));
+        let halves = |a, b| {
+            let (even, odd) =
+                (_mm512_shuffle_i64x2::<0b10_00_10_00>(a, b), _mm512_shuffle_i64x2::<0b11_01_11_01>(a, b));
+            _mm512_add_epi64(even, odd)
+        };
+        let last = pair(of[4], of[5]);
+        halves(halves(pair(of[0], of[1]), pair(of[2], of[3])), halves(last, last))
     }
 }
 
@@ -235,13 +252,12 @@ impl Lanes for Avx512 {
     fn count(self, keys: &Keys, at: &Row) -> Row {
         // SAFETY: `self` proves that the instructions are there; a row is a whole vector.
         unsafe {
-            let (at, minus) = (load_row(at), _mm512_set1_epi16(-1));
-            let mut counts = _mm512_setzero_si512();
+            let at = load_row(at);
+            let mut beyond = _mm512_setzero_si512();
             for row in keys.rows() {
-                let within = _mm512_cmple_epi16_mask(load_row(row), at);
-                counts = _mm512_mask_sub_epi16(counts, within, counts, minus);
+                beyond = _mm512_add_epi16(beyond, sign(_mm512_sub_epi16(at, load_row(row))));
             }
-            row(counts)
+            row(_mm512_sub_epi16(_mm512_set1_epi16(keys.rows().len() as i16), beyond))
         }
     }
 
@@ -249,32 +265,36 @@ impl Lanes for Avx512 {
     fn count_between(self, keys: &Keys, at: &Row) -> (Row, Row, Row) {
         // SAFETY: `self` proves that the instructions are there; a row is a whole vector.
         unsafe {
-            let (at, minus) = (load_row(at), _mm512_set1_epi16(-1));
-            let (mut counts, mut below) = (_mm512_setzero_si512(), _mm512_setzero_si512());
-            let mut above = _mm512_set1_epi16(i16::MAX);
+            let at = load_row(at);
+            // How far ranks are below the threshold: as unsigned numbers, those above it are the largest.
+            let (mut beyond, mut least) = (_mm512_setzero_si512(), at);
+            let mut most = _mm512_sub_epi16(at, _mm512_set1_epi16(i16::MAX));
             for row in keys.rows() {
-                let rank = load_row(row);
-                let within = _mm512_cmple_epi16_mask(rank, at);
-                counts = _mm512_mask_sub_epi16(counts, within, counts, minus);
-                below = _mm512_mask_max_epi16(below, within, below, rank);
-                above = _mm512_mask_min_epi16(above, !within, above, rank);
+                let below = _mm512_sub_epi16(at, load_row(row));
+                beyond = _mm512_add_epi16(beyond, sign(below));
+                least = _mm512_min_epu16(least, below);
+                most = _mm512_max_epu16(most, below);
             }
-            (row(counts), row(below), row(_mm512_add_epi16(above, minus)))
+            let counts = _mm512_sub_epi16(_mm512_set1_epi16(keys.rows().len() as i16), beyond);
+            let above = _mm512_sub_epi16(_mm512_sub_epi16(at, most), _mm512_set1_epi16(1));
+            (row(counts), row(_mm512_sub_epi16(at, least)), row(above))
         }
     }
 
     #[inline(always)]
-    fn members(self, keys: &Keys, at: &Row, of: &mut [u32]) -> u32 {
+    fn members(self, keys: &Keys, at: &Row, of: &mut [u32]) -> (u32, Row) {
         // SAFETY: `self` proves that the instructions are there; a row is a whole vector.
         unsafe {
             let at = load_row(at);
-            let mut equal = 0;
+            let (mut beyond, mut least) = (_mm512_setzero_si512(), _mm512_set1_epi16(-1));
             for (row, of) in keys.rows().iter().zip(of) {
-                let rank = load_row(row);
-                *of = _mm512_cmple_epi16_mask(rank, at);
-                equal |= _mm512_cmpeq_epi16_mask(rank, at);
+                let below = _mm512_sub_epi16(at, load_row(row));
+                *of = !_mm512_movepi16_mask(below);
+                beyond = _mm512_add_epi16(beyond, sign(below));
+                least = _mm512_min_epu16(least, below);
             }
-            equal
+            let counts = _mm512_sub_epi16(_mm512_set1_epi16(keys.rows().len() as i16), beyond);
+            (_mm512_testn_epi16_mask(least, least), row(counts))
         }
     }
 
@@ -303,80 +323,51 @@ impl Lanes for Avx512 {
     }
 
     #[inline(always)]
-    fn fetch(self, field: &NormalField, vertex: DVec3, near: &mut Near) {
+    fn sums(self, field: &NormalField, vertex: DVec3, near: &mut Near, weighting: &Weighting) -> Sums {
         let triangles = field.centroids.len().min(field.normals.len());
-        assert!(near.len <= MOST && near.id.len() >= MOST && near.value.len() >= 6 * MOST, "room for vectors");
-        let value = near.value.as_mut_ptr();
-        // SAFETY: `self` proves that the instructions are there. `i` is below `near.len`, and `MOST` a multiple of
-        // eight. Only numbers below `triangles` are gathered, and a `DVec3` is three `f64` in a row.
+        let len = near.len;
+        assert!(len <= MOST && near.id.len() >= MOST + 8 && near.of.len() >= MOST + 8, "whole vectors of neighbours");
+        // SAFETY: `self` proves that the instructions are there; `i` is below `len`, and vectors end in the slack. Only
+        // numbers below `triangles` are gathered, and a `DVec3` is three `f64` in a row.
         unsafe {
-            let most = _mm512_set1_epi64(triangles as i64);
-            let mut i = 0;
-            while i < near.len {
-                let id = _mm512_cvtepu32_epi64(_mm256_loadu_si256(near.id.as_ptr().add(i).cast()));
-                let mask = _mm512_cmplt_epi64_mask(id, most);
-                let at = _mm512_add_epi64(id, _mm512_add_epi64(id, id));
-                let zero = _mm512_setzero_pd();
-                for axis in 0..3 {
-                    let from = field.centroids.as_ptr().cast::<f64>().add(axis);
-                    let place = _mm512_mask_i64gather_pd::<8>(zero, mask, at, from);
-                    let from = field.normals.as_ptr().cast::<f64>().add(axis);
-                    let normal = _mm512_mask_i64gather_pd::<8>(zero, mask, at, from);
-                    _mm512_storeu_pd(value.add(axis * MOST + i), _mm512_sub_pd(place, _mm512_set1_pd(vertex[axis])));
-                    _mm512_storeu_pd(value.add((3 + axis) * MOST + i), normal);
-                }
-                i += 8;
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn sums(self, near: &Near, weighting: &Weighting, neighbours: usize) -> [Sum; 6] {
-        assert!(
-            near.len <= MOST && near.value.len() >= 6 * MOST && near.of.len() >= MOST,
-            "whole vectors of neighbours"
-        );
-        let value = near.value.as_ptr();
-        // SAFETY: `self` proves that the instructions are there; `i` is below `near.len`, and `MOST` a multiple of the
-        // lanes.
-        unsafe {
+            let vertex = vertex.to_array().map(|v| _mm512_set1_pd(v));
             let offset = _mm512_set1_pd(weighting.offset_m);
             let (least, scale) = (_mm512_set1_pd(weighting.least_m2), _mm512_set1_pd(weighting.scale));
             let round = _mm512_set1_pd(ROUND);
-            let mut sums = [[_mm512_setzero_si512(); 2]; 6];
+            let (centroids, normals) = (field.centroids.as_ptr().cast::<f64>(), field.normals.as_ptr().cast::<f64>());
+            let (most, zero) = (_mm512_set1_epi64(triangles as i64), _mm512_setzero_pd());
+            let (mut weighted, mut weights) = ([_mm512_setzero_si512(); 6], [_mm512_setzero_si512(); 6]);
             let mut i = 0;
-            while i < near.len {
-                let u = [load_f64(value, i), load_f64(value, MOST + i), load_f64(value, 2 * MOST + i)];
+            while i < len {
+                let id = _mm512_cvtepu32_epi64(_mm256_loadu_si256(near.id.as_ptr().add(i).cast()));
+                let of = _mm512_cvtepu32_epi64(_mm256_loadu_si256(near.of.as_ptr().add(i).cast()));
+                let known = _mm512_cmplt_epi64_mask(id, most);
+                let at = _mm512_add_epi64(id, _mm512_add_epi64(id, id));
+                let (mut u, mut normal) = ([zero; 3], [zero; 3]);
+                for axis in 0..3 {
+                    let place = _mm512_mask_i64gather_pd::<8>(zero, known, at, centroids.add(axis));
+                    normal[axis] = _mm512_mask_i64gather_pd::<8>(zero, known, at, normals.add(axis));
+                    u[axis] = _mm512_sub_pd(place, vertex[axis]);
+                }
                 let (x2, y2, z2) = (_mm512_mul_pd(u[0], u[0]), _mm512_mul_pd(u[1], u[1]), _mm512_mul_pd(u[2], u[2]));
                 let rest = [_mm512_add_pd(y2, z2), _mm512_add_pd(z2, x2), _mm512_add_pd(x2, y2)];
-                let of = _mm512_cvtepu32_epi64(_mm256_loadu_si256(near.of.as_ptr().add(i).cast()));
-                for axis in 0..3 {
-                    let normal = load_f64(value, (3 + axis) * MOST + i);
-                    for side in 0..2 {
-                        let q = 2 * axis + side;
-                        let mask = _mm512_test_epi64_mask(of, _mm512_set1_epi64(1 << (near.shift + q)));
-                        let a = if side == 0 { _mm512_sub_pd(u[axis], offset) } else { _mm512_add_pd(u[axis], offset) };
-                        let w = weight(a, rest[axis], least, scale);
-                        let (weighted, weights) =
-                            (_mm512_add_pd(_mm512_mul_pd(w, normal), round), _mm512_add_pd(w, round));
-                        let [sum_n, sum] = sums[q];
-                        sums[q] = [
-                            _mm512_mask_add_epi64(sum_n, mask, sum_n, _mm512_castpd_si512(weighted)),
-                            _mm512_mask_add_epi64(sum, mask, sum, _mm512_castpd_si512(weights)),
-                        ];
-                    }
+                for q in 0..6 {
+                    let u = u[q / 2];
+                    let belongs = _mm512_test_epi64_mask(of, _mm512_set1_epi64(1 << (near.shift + q)));
+                    let a = if q % 2 == 0 { _mm512_sub_pd(u, offset) } else { _mm512_add_pd(u, offset) };
+                    let w = weight(belongs, a, rest[q / 2], least, scale);
+                    let part = _mm512_add_pd(_mm512_mul_pd(w, normal[q / 2]), round);
+                    weighted[q] = _mm512_add_epi64(weighted[q], _mm512_castpd_si512(part));
+                    weights[q] = _mm512_add_epi64(weights[q], _mm512_castpd_si512(_mm512_add_pd(w, round)));
                 }
                 i += 8;
             }
-            let surplus = surplus(neighbours);
-            let mut result = [Sum::default(); 6];
-            for q in 0..6 {
-                result[q] = Sum {
-                    weighted: _mm512_reduce_add_epi64(sums[q][0]).wrapping_sub(surplus),
-                    weights: _mm512_reduce_add_epi64(sums[q][1]).wrapping_sub(surplus),
-                };
-            }
-            result
+            let surplus = _mm512_set1_epi64(surplus(len.next_multiple_of(8)));
+            let mut sums = Sums::default();
+            let (to_weighted, to_weights) = (sums.weighted.as_mut_ptr(), sums.weights.as_mut_ptr());
+            _mm512_store_si512(to_weighted.cast(), _mm512_sub_epi64(totals(weighted), surplus));
+            _mm512_store_si512(to_weights.cast(), _mm512_sub_epi64(totals(weights), surplus));
+            sums
         }
     }
 }

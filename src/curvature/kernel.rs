@@ -1,7 +1,7 @@
 //! The divergence at all vertices of a column of cells, with the work shared.
 //!
-//! The candidates around a cell are gathered once. Up to five vertices next to one another (3.7 on average, counted on a
-//! bed of 481,851) share a narrower list of about 90, which reaches as far as the vertices before needed and some more.
+//! The candidates around a cell are gathered once. Up to five vertices next to one another (4.3 on average, counted on a
+//! bed of 481,851) share a narrower list of about 100, which reaches as far as the vertices before needed and some more.
 //! Ranks at all thirty stencil points at once ([`super::thresholds`]) give the sets of neighbours, and only these, about
 //! 42 for a vertex, are fetched in `f64` and weighted ([`super::weights`]).
 //!
@@ -19,7 +19,7 @@ use super::grid::Grid;
 use super::lanes::{Keys, LANES, Lanes, MOST, Near, Places, Row, TOGETHER};
 use super::neighbours::Reserve;
 use super::thresholds::{COMPLETE, HIGHEST, search, undecided};
-use super::weights::{Sum, Weighting, divergence_of};
+use super::weights::Weighting;
 use crate::geometry::DVec3;
 use crate::tile::NormalField;
 
@@ -201,7 +201,7 @@ fn together<L: Lanes>(lanes: L, column: &mut Column<'_, '_>, block: &Block, queu
     let group = Group::around(at);
     let mut radius_m = work.radius_m.min(reach_m);
     let mut thresholds = Row([0; LANES]);
-    let per_m2 = loop {
+    let (per_m2, equal) = loop {
         group.narrow(lanes, &work.block, &mut work.list, (radius_m, offset_m));
         let n = work.list.len;
         if n > MOST || radius_m > 1e3 * job.grid.cell_m {
@@ -216,11 +216,12 @@ fn together<L: Lanes>(lanes: L, column: &mut Column<'_, '_>, block: &Block, queu
             place(&mut work.places, at, &group, offset_m, per_m2);
             lanes.rank(&work.list, &work.places, &mut work.keys);
             let guess = work.last_m2.map(|m2| (m2 * per_m2).min(f64::from(HIGHEST)) as i16);
-            for (l, t) in thresholds.0.iter_mut().enumerate() {
-                *t = guess[l % 6];
+            for v in 0..TOGETHER {
+                thresholds.0[6 * v..6 * v + 6].copy_from_slice(&guess);
             }
-            if search(lanes, &work.keys, k as i32, &mut thresholds) {
-                break per_m2;
+            thresholds.0[6 * TOGETHER..].copy_from_slice(&guess[..LANES - 6 * TOGETHER]);
+            if let Some(equal) = search(lanes, &work.keys, k as i16, &mut thresholds, &mut work.of[..n]) {
+                break (per_m2, equal);
             }
         }
         if radius_m >= reach_m {
@@ -229,18 +230,16 @@ fn together<L: Lanes>(lanes: L, column: &mut Column<'_, '_>, block: &Block, queu
         radius_m = (1.15 * radius_m).min(reach_m);
     };
     let n = work.list.len;
-    let equal = lanes.members(&work.keys, &thresholds, &mut work.of[..n]);
     work.of[n..n + SLACK].fill(0);
     let m2_per = 1.0 / per_m2;
-    work.last_m2 = [0.0; 6];
-    let share = m2_per / queue.len() as f64;
+    let mut total = [0i32; 6];
     let mut farthest = 0;
     for (v, e) in queue.iter().enumerate() {
         let p = point(e);
         let own = &thresholds.0[6 * v..6 * v + 6];
         let mut highest = 0;
-        for (t, m2) in own.iter().zip(&mut work.last_m2) {
-            *m2 += (f64::from(*t) + 0.5) * share;
+        for (t, total) in own.iter().zip(&mut total) {
+            *total += i32::from(*t);
             highest = highest.max(*t);
         }
         farthest = farthest.max(highest);
@@ -257,12 +256,13 @@ fn together<L: Lanes>(lanes: L, column: &mut Column<'_, '_>, block: &Block, queu
             lanes.choose(&work.list, &work.of[..n + SLACK], 63 << (6 * v), &mut work.near);
             let end = work.near.len;
             work.near.of[end..end + 8].fill(0);
-            lanes.fetch(job.field, p, &mut work.near);
-            Some(divergence_of(&lanes.sums(&work.near, &job.weighting, k), offset_m))
+            Some(lanes.sums(job.field, p, &mut work.near, &job.weighting).divergence(offset_m))
         } else {
             None
         };
     }
+    let share = m2_per / queue.len() as f64;
+    work.last_m2 = total.map(|t| (f64::from(t) + 0.5) * share);
     work.radius_m = SPARE * (((f64::from(farthest) + 1.5) * m2_per).sqrt() + offset_m);
     Outcome::Known
 }
@@ -274,36 +274,39 @@ fn place(places: &mut Places, at: &[DVec3], group: &Group, offset_m: f64, per_m2
     let (shift, scale) = ((-2.0 * per_m2 * offset_m) as f32, -2.0 * per_m2);
     for v in 0..TOGETHER {
         let u = at[if v < at.len() { v } else { 0 }] - centre;
-        let (a, b) = ((u * scale).as_vec3(), per_m2 * (u.length_squared() + offset_m * offset_m));
-        let b_shift = u * (2.0 * per_m2 * offset_m);
+        let a = (u * scale).as_vec3();
+        let (b, c) = (per_m2 * (u.length_squared() + offset_m * offset_m), u * (2.0 * per_m2 * offset_m));
+        // Eight lanes at a time; the next vertex mends the last two.
+        let square = [c.x, -c.x, c.y, -c.y, c.z, -c.z, 0.0, 0.0];
+        places.b[6 * v..6 * v + 8].copy_from_slice(&square.map(|c| (b + c) as f32));
         for axis in 0..3 {
-            places.a[axis][6 * v..6 * v + 6].fill(a[axis]);
-            places.a[axis][6 * v + 2 * axis] = a[axis] + shift;
-            places.a[axis][6 * v + 2 * axis + 1] = a[axis] - shift;
-            places.b[6 * v + 2 * axis] = (b + b_shift[axis]) as f32;
-            places.b[6 * v + 2 * axis + 1] = (b - b_shift[axis]) as f32;
+            let mut own = [a[axis]; 8];
+            own[2 * axis] += shift;
+            own[2 * axis + 1] -= shift;
+            places.a[axis][6 * v..6 * v + 8].copy_from_slice(&own);
         }
     }
-    for l in 6 * TOGETHER..LANES {
-        for axis in 0..3 {
-            places.a[axis][l] = places.a[axis][l % 6];
-        }
-        places.b[l] = places.b[l % 6];
+    for lanes in places.a.iter_mut().chain([&mut places.b]) {
+        lanes.copy_within(0..LANES - 6 * TOGETHER, 6 * TOGETHER);
     }
     places.scale = per_m2 as f32;
 }
 
-/// A bound on the error of ranks: coordinates are `f32` relative to cells, so that each difference of two is off by
-/// up to `each`, a distance by sqrt(3) times that, and its square (up to `complete_m`²) by twice that times the
-/// distance. The square is made of terms that add up to `sum`² at most, and rounded fourteen times.
+/// A bound on the error of the ranks of candidates as near as `complete_m`. Coordinates are rounded to `f32` relative to
+/// their own cell, to the block's and to the group's centre: each is off by up to `each`, a distance by sqrt(3) times
+/// that, and its square by twice that times the distance. The sum then made has the terms c², s² and 2 s·c, of a
+/// candidate no further than s + `complete_m` from the group's centre and a stencil point no further than s; nine, five
+/// and six roundings lie between them and the rank.
 #[inline(always)]
 fn error_in_ranks(job: &Job<'_>, size_m: f64, group: &Group, radius_m: f64, complete_m: f64) -> f64 {
-    let ulp = f64::from(f32::EPSILON) / 2.0;
-    let size = size_m + radius_m + job.grid.cell_m;
-    let each = ulp * 3.0 * (size + radius_m) + 8.0 * f64::EPSILON * (job.grid.magnitude_m() + size);
+    let ulp = 1.01 * f64::from(f32::EPSILON) / 2.0;
+    let in_block = size_m + radius_m;
+    let sizes = in_block.max(0.5 * job.grid.cell_m) + in_block + group.radius_m + radius_m;
+    let each = ulp * sizes + 8.0 * f64::EPSILON * (job.grid.magnitude_m() + in_block + job.grid.cell_m);
     let relative = each / complete_m;
-    let sum = (2.0 * group.radius_m + radius_m + job.weighting.offset_m) / complete_m;
-    COMPLETE * (relative * (3.5 + 3.0 * relative) + 14.0 * ulp * sum * sum)
+    let s = (group.radius_m + job.weighting.offset_m) / complete_m;
+    let c = s + 1.0;
+    COMPLETE * (relative * (3.5 + 3.0 * relative) + ulp * (9.0 * c * c + 5.0 * s * s + 12.0 * s * c))
 }
 
 /// Where a stencil point is: +x, -x, +y, -y, +z, -z.
@@ -346,15 +349,4 @@ fn certain(job: &Job<'_>, work: &Workspace, p: DVec3, v: usize) -> bool {
             .fold(0.0, f64::max);
         farthest.sqrt() < job.field.loaded.margin_m(place)
     })
-}
-
-/// The sum of one stencil point's neighbours.
-pub(super) fn sum_of(field: &NormalField, found: &[(f64, u32)], p: DVec3, q: usize, weighting: &Weighting) -> Sum {
-    let side = if q.is_multiple_of(2) { 1.0 } else { -1.0 };
-    let mut sum = Sum::default();
-    for &(_, t) in found {
-        let u = field.centroids[t as usize] - p;
-        sum.add(weighting.weight(weighting.distance2(u, q / 2, side)), field.normals[t as usize][q / 2]);
-    }
-    sum
 }

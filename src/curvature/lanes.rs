@@ -5,7 +5,7 @@
 #![allow(clippy::needless_range_loop, reason = "stencil points and axes run through several arrays at once")]
 
 use super::buffer::{Aligned, Points, SLACK};
-use super::weights::{Sum, Weighting};
+use super::weights::{Sums, Weighting};
 use crate::geometry::DVec3;
 use crate::tile::NormalField;
 
@@ -61,12 +61,12 @@ impl Keys {
     }
 }
 
-/// Neighbours of at least one stencil point of a vertex, exactly: offsets from the vertex and normals.
+/// Neighbours of at least one stencil point of a vertex.
 #[derive(Debug)]
 pub(super) struct Near {
     /// Local triangle numbers.
     pub(super) id: Aligned<u32>,
-    /// x, y, z of the offset (metres) and of the normal, `MOST` each.
+    /// Place for x, y, z of the offset (metres) and of the normal, `MOST` each.
     pub(super) value: Aligned<f64>,
     /// Which stencil points they belong to: bit `shift` + q for point q.
     pub(super) of: Aligned<u32>,
@@ -133,17 +133,14 @@ pub(super) trait Lanes: Copy + Send + Sync {
     fn count_between(self, keys: &Keys, at: &Row) -> (Row, Row, Row);
 
     /// For each candidate, the stencil points where it ranks no higher than the threshold; and those where some
-    /// candidate ranks the same.
-    fn members(self, keys: &Keys, at: &Row, of: &mut [u32]) -> u32;
+    /// candidate ranks the same; and how many rank no higher.
+    fn members(self, keys: &Keys, at: &Row, of: &mut [u32]) -> (u32, Row);
 
     /// Chooses the candidates that belong to a stencil point in `bits`. From the last one on, `of` has `SLACK` zeros.
     fn choose(self, points: &Points, of: &[u32], bits: u32, near: &mut Near);
 
-    /// Fetches offsets from a vertex and normals of the numbered triangles.
-    fn fetch(self, field: &NormalField, vertex: DVec3, near: &mut Near);
-
-    /// Sums at the six stencil points, with as many neighbours each.
-    fn sums(self, near: &Near, weighting: &Weighting, neighbours: usize) -> [Sum; 6];
+    /// Sums at the six stencil points of a vertex. From the last one on, `near.of` has eight zeros.
+    fn sums(self, field: &NormalField, vertex: DVec3, near: &mut Near, weighting: &Weighting) -> Sums;
 }
 
 /// Plain Rust, for any processor.
@@ -170,7 +167,7 @@ fn keep(all: &Points, kept: &mut Points, limit: f32, relative: [f32; 3], distanc
     kept.len = n;
 }
 
-/// [`Lanes::fetch`], one by one.
+/// Offsets from a vertex and normals of the numbered triangles; then zeros, to the end of a vector.
 #[inline(always)]
 pub(super) fn fetch(field: &NormalField, vertex: DVec3, near: &mut Near) {
     let value: &mut [f64] = &mut near.value;
@@ -183,6 +180,10 @@ pub(super) fn fetch(field: &NormalField, vertex: DVec3, near: &mut Near) {
         let (u, normal) = (field.centroids[t as usize] - vertex, field.normals[t as usize]);
         (x[i], y[i], z[i]) = (u.x, u.y, u.z);
         (nx[i], ny[i], nz[i]) = (normal.x, normal.y, normal.z);
+    }
+    for normal in [nx, ny, nz] {
+        let end = near.len.next_multiple_of(4);
+        normal[near.len..end].fill(0.0);
     }
 }
 
@@ -253,7 +254,7 @@ impl Lanes for Plain {
     }
 
     #[inline(always)]
-    fn members(self, keys: &Keys, at: &Row, of: &mut [u32]) -> u32 {
+    fn members(self, keys: &Keys, at: &Row, of: &mut [u32]) -> (u32, Row) {
         let mut equal = 0;
         for (row, of) in keys.rows().iter().zip(of) {
             *of = 0;
@@ -262,7 +263,7 @@ impl Lanes for Plain {
                 equal |= u32::from(row.0[l] == at.0[l]) << l;
             }
         }
-        equal
+        (equal, self.count(keys, at))
     }
 
     #[inline(always)]
@@ -277,13 +278,9 @@ impl Lanes for Plain {
     }
 
     #[inline(always)]
-    fn fetch(self, field: &NormalField, vertex: DVec3, near: &mut Near) {
+    fn sums(self, field: &NormalField, vertex: DVec3, near: &mut Near, weighting: &Weighting) -> Sums {
         fetch(field, vertex, near);
-    }
-
-    #[inline(always)]
-    fn sums(self, near: &Near, weighting: &Weighting, _: usize) -> [Sum; 6] {
-        let mut sums = [Sum::default(); 6];
+        let mut sums = Sums::default();
         let value = |k: usize| &near.value[k * MOST..k * MOST + near.len];
         for q in 0..6usize {
             let side = if q.is_multiple_of(2) { weighting.offset_m } else { -weighting.offset_m };
@@ -297,7 +294,7 @@ impl Lanes for Plain {
                 weights = weights.wrapping_add(super::weights::rounded(weight) & belongs);
                 weighted = weighted.wrapping_add(super::weights::rounded(weight * n[i]) & belongs);
             }
-            sums[q] = Sum { weighted, weights };
+            (sums.weighted[q], sums.weights[q]) = (weighted, weights);
         }
         sums
     }

@@ -4,8 +4,8 @@
 //! A search gathers a ball, grows it until it holds enough, and keeps the nearest.
 
 use super::Stencil;
-use super::kernel::{stencil_point, sum_of};
-use super::weights::{Weighting, divergence_of};
+use super::kernel::stencil_point;
+use super::weights::{Sums, Weighting};
 use crate::geometry::{DVec3, PlanBox};
 use crate::tile::NormalField;
 use std::sync::OnceLock;
@@ -56,12 +56,18 @@ impl<'a> Reserve<'a> {
     pub(super) fn divergence(&self, p: DVec3, stencil: &Stencil, weighting: &Weighting) -> Option<f64> {
         let mut found = Vec::new();
         let mut certain = true;
-        let sums = [0, 1, 2, 3, 4, 5].map(|q| {
+        let mut sums = Sums::default();
+        for q in 0..6 {
             let place = stencil_point(p, q, stencil.offset_m);
             certain &= self.search().nearest(place, stencil.neighbours, stencil.first_radius_m(), &mut found);
-            sum_of(self.field, &found, p, q, weighting)
-        });
-        certain.then(|| divergence_of(&sums, stencil.offset_m))
+            let side = if q.is_multiple_of(2) { 1.0 } else { -1.0 };
+            for &(_, t) in &found {
+                let u = self.field.centroids[t as usize] - p;
+                let weight = weighting.weight(weighting.distance2(u, q / 2, side));
+                sums.add(q, weight, self.field.normals[t as usize][q / 2]);
+            }
+        }
+        certain.then(|| sums.divergence(stencil.offset_m))
     }
 
     /// Distance to the nearest centroid, metres; none where uncertain.

@@ -62,21 +62,33 @@ impl Weighting {
     }
 }
 
-/// Weighted normals' component and weights of one stencil point, as integers.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct Sum {
+/// Weighted normals' components and weights of the stencil points +x, -x, +y, -y, +z, -z, as integers. Eight of each, so
+/// that they are vectors: the last two mean nothing.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(C, align(64))]
+pub(super) struct Sums {
     /// Of weights times normals.
-    pub(super) weighted: i64,
+    pub(super) weighted: [i64; 8],
     /// Of weights.
-    pub(super) weights: i64,
+    pub(super) weights: [i64; 8],
 }
 
-impl Sum {
-    /// Adds one neighbour.
+impl Sums {
+    /// Adds a neighbour of one stencil point.
     #[inline(always)]
-    pub(super) fn add(&mut self, weight: f64, normal: f64) {
-        self.weights = self.weights.wrapping_add(rounded(weight));
-        self.weighted = self.weighted.wrapping_add(rounded(weight * normal));
+    pub(super) fn add(&mut self, q: usize, weight: f64, normal: f64) {
+        self.weights[q] = self.weights[q].wrapping_add(rounded(weight));
+        self.weighted[q] = self.weighted[q].wrapping_add(rounded(weight * normal));
+    }
+
+    /// The divergence, 1/m.
+    #[inline(always)]
+    pub(super) fn divergence(&self, offset_m: f64) -> f64 {
+        let mut mean = [0.0; 8];
+        for (mean, (&weighted, &weights)) in mean.iter_mut().zip(self.weighted.iter().zip(&self.weights)) {
+            *mean = weighted as f64 / weights as f64;
+        }
+        ((mean[0] - mean[1]) + (mean[2] - mean[3]) + (mean[4] - mean[5])) / (2.0 * offset_m)
     }
 }
 
@@ -86,20 +98,10 @@ pub(super) fn rounded(x: f64) -> i64 {
     ((x + ROUND).to_bits() as i64).wrapping_sub(ROUND.to_bits() as i64)
 }
 
-/// What rounding leaves in the sum of the bits of as many rounded numbers.
+/// What is too much in the sum of the bits of as many numbers that were rounded by adding [`ROUND`].
 #[inline(always)]
 pub(super) fn surplus(count: usize) -> i64 {
     (ROUND.to_bits() as i64).wrapping_mul(count as i64)
-}
-
-/// The divergence from the sums at +x, -x, +y, -y, +z, -z; 1/m.
-#[inline(always)]
-pub(super) fn divergence_of(sums: &[Sum; 6], offset_m: f64) -> f64 {
-    let mut mean = [0.0; 6];
-    for (mean, sum) in mean.iter_mut().zip(sums) {
-        *mean = sum.weighted as f64 / sum.weights as f64;
-    }
-    ((mean[0] - mean[1]) + (mean[2] - mean[3]) + (mean[4] - mean[5])) / (2.0 * offset_m)
 }
 
 #[cfg(test)]
