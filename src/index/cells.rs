@@ -55,8 +55,10 @@ impl CellGrid {
     }
 
     /// Column and row of a point; points beyond the border belong to the border cells.
+    #[inline]
     pub fn cell_of(&self, p: DVec3) -> [u32; 2] {
-        let place = |x: f64, min: f64, n: u32| (((x - min) / self.cell_m).floor().max(0.0) as u32).min(n - 1);
+        // The conversion cuts off towards 0, and gives 0 below it.
+        let place = |x: f64, min: f64, n: u32| (((x - min) / self.cell_m) as u32).min(n - 1);
         [place(p.x, self.min[0], self.columns), place(p.y, self.min[1], self.rows)]
     }
 

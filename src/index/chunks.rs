@@ -7,6 +7,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Elements of a chunk: enough to hide its cost, few enough to share out.
 const CHUNK: u64 = 1 << 15;
+/// Elements that are read at a time: they stay in the processor's cache.
+const PIECE: u64 = 1 << 11;
 /// Chunks between two releases of the survey's pages: some tens of megabytes.
 const RELEASE: u64 = 32;
 
@@ -47,4 +49,9 @@ pub(super) fn over_chunks_then<S>(
     });
     surface.release();
     done.into_iter().collect()
+}
+
+/// Cuts what a thread works into pieces that are read at a time.
+pub(super) fn pieces(range: Range<u64>) -> impl Iterator<Item = Range<u64>> {
+    range.clone().step_by(PIECE as usize).map(move |first| first..(first + PIECE).min(range.end))
 }

@@ -1,6 +1,6 @@
 //! Numbers of vertices and triangles, as narrow as the survey allows.
 
-use crate::store::{Column, Element, Shelf, StoreError};
+use crate::store::{Column, ColumnWriter, Element, Shelf, StoreError};
 use std::ops::Range;
 
 /// A number of a vertex or triangle: 32 bits where all of a survey fit, else 64.
@@ -57,10 +57,10 @@ impl<const N: usize> Numbers<N> {
         }
     }
 
-    pub(super) fn write(&self, first: u64, numbers: impl Iterator<Item = [u64; N]>) -> Result<(), StoreError> {
+    pub(super) fn writer(&self, first: u64) -> NumbersWriter<'_, N> {
         match self {
-            Numbers::Narrow(column) => column.write(first, numbers.map(|n| n.map(u32::of))),
-            Numbers::Wide(column) => column.write(first, numbers),
+            Numbers::Narrow(column) => NumbersWriter::Narrow(column.writer(first)),
+            Numbers::Wide(column) => NumbersWriter::Wide(column.writer(first)),
         }
     }
 
@@ -75,10 +75,10 @@ impl<const N: usize> Numbers<N> {
         matches!(self, Numbers::Wide(_))
     }
 
-    pub(super) fn checksum(&self) -> Result<u64, StoreError> {
+    pub(super) fn checksum(&self, range: Range<u64>) -> Result<u64, StoreError> {
         match self {
-            Numbers::Narrow(column) => column.checksum(),
-            Numbers::Wide(column) => column.checksum(),
+            Numbers::Narrow(column) => column.checksum(range),
+            Numbers::Wide(column) => column.checksum(range),
         }
     }
 
@@ -86,6 +86,29 @@ impl<const N: usize> Numbers<N> {
         match self {
             Numbers::Narrow(column) => column.sync(),
             Numbers::Wide(column) => column.sync(),
+        }
+    }
+}
+
+/// Writes numbers one behind the other.
+pub(super) enum NumbersWriter<'a, const N: usize> {
+    Narrow(ColumnWriter<'a, [u32; N]>),
+    Wide(ColumnWriter<'a, [u64; N]>),
+}
+
+impl<const N: usize> NumbersWriter<'_, N> {
+    #[inline]
+    pub(super) fn put(&mut self, numbers: [u64; N]) -> Result<(), StoreError> {
+        match self {
+            NumbersWriter::Narrow(writer) => writer.put(numbers.map(u32::of)),
+            NumbersWriter::Wide(writer) => writer.put(numbers),
+        }
+    }
+
+    pub(super) fn finish(self) -> Result<u64, StoreError> {
+        match self {
+            NumbersWriter::Narrow(writer) => writer.finish(),
+            NumbersWriter::Wide(writer) => writer.finish(),
         }
     }
 }

@@ -14,22 +14,27 @@
 
 mod cells;
 mod chunks;
+mod colors;
 mod corners;
 mod ground;
 mod identity;
 mod manifest;
+mod order;
 mod scale;
+mod seal;
 mod shards;
 mod triangles;
 mod vertices;
 
 pub use cells::{CellBlock, CellGrid, CellStarts};
+pub use colors::Colors;
 pub use scale::Scale;
 
 use crate::geometry::{DVec3, ExactSum};
 use crate::open::Surface;
 use crate::store::{Column, Shelf, StoreError};
 use identity::Numbers;
+use seal::Seal;
 use std::ops::Range;
 
 /// A survey that cannot be indexed.
@@ -61,6 +66,7 @@ pub struct Index {
     /// Survey-wide figures. `spacing_m` is 0 until it has been measured.
     pub scale: Scale,
     columns: Columns,
+    seals: Vec<Seal>,
 }
 
 /// What the index keeps on disk.
@@ -71,7 +77,7 @@ struct Columns {
     corners: Numbers<3>,
     vertex_inputs: Numbers<1>,
     triangle_inputs: Numbers<1>,
-    colors: Option<(f64, Column<[f32; 3]>)>,
+    colors: Option<Colors>,
 }
 
 const POSITIONS: &str = "positions";
@@ -117,26 +123,30 @@ impl Index {
             vertex_inputs: Numbers::create(shelf, VERTEX_INPUTS, ground.vertices, wide)?,
             triangle_inputs: Numbers::create(shelf, TRIANGLE_INPUTS, surface.triangles(), wide)?,
             colors: match surface.full_color() {
-                Some(full) => Some((full, shelf.create(COLORS, ground.vertices)?)),
+                Some(full) => Some(Colors::create(shelf, COLORS, ground.vertices, full)?),
                 None => None,
             },
         };
-        let to = vertices::Sorted {
-            positions: &columns.positions,
-            inputs: &columns.vertex_inputs,
-            colors: columns.colors.as_ref().map(|(_, column)| column),
+        let work = Work { surface, ground: &ground, shards: &shards, shelf, columns: &columns, room };
+        let bytes = columns.colors.as_ref().is_none_or(|colors| Colors::are_bytes(colors.full()));
+        let (vertices, triangles) = match (wide, bytes) {
+            (false, true) => work.sort::<u32, [u8; 3]>()?,
+            (false, false) => work.sort::<u32, [f32; 3]>()?,
+            (true, true) => work.sort::<u64, [u8; 3]>()?,
+            (true, false) => work.sort::<u64, [f32; 3]>()?,
         };
-        let vertices = CellStarts::new(vertices::sort(surface, &ground, &shards, shelf, &to)?);
-        let (triangles, sums) = if wide {
-            sort_triangles::<u64>(surface, &ground, &shards, shelf, &columns, room)?
-        } else {
-            sort_triangles::<u32>(surface, &ground, &shards, shelf, &columns, room)?
-        };
-        let scale = sums.scale(&ground, surface.triangles());
+        let scale = triangles.sums.scale(&ground, surface.triangles());
         if scale.mean_triangle_area_m2 <= 0.0 {
             return Err(IndexError::NoArea { triangles: scale.triangles });
         }
-        Ok(Index { grid: ground.grid, triangles: CellStarts::new(triangles), vertices, scale, columns })
+        Ok(Index {
+            grid: ground.grid,
+            triangles: CellStarts::new(triangles.start),
+            vertices: CellStarts::new(vertices.start),
+            scale,
+            columns,
+            seals: seal::of_shards(&shards, &vertices.checksums, triangles.written),
+        })
     }
 
     /// Hands the corners of a range of triangles to `take`, in order.
@@ -158,9 +168,9 @@ impl Index {
         &self.columns.valences
     }
 
-    /// Colours of vertices as the input has them, red, green, blue, and what stands for full colour.
-    pub fn colors(&self) -> Option<(f64, &Column<[f32; 3]>)> {
-        self.columns.colors.as_ref().map(|(full, column)| (*full, column))
+    /// Colours of vertices as the input has them, if it has any.
+    pub fn colors(&self) -> Option<&Colors> {
+        self.columns.colors.as_ref()
     }
 
     /// The input's numbers of a range of triangles.
@@ -184,23 +194,39 @@ impl Index {
     }
 }
 
-fn sort_triangles<I: identity::Id>(
-    surface: &dyn Surface,
-    ground: &ground::Ground,
-    shards: &[shards::Shard],
-    shelf: &Shelf,
-    columns: &Columns,
+/// What is sorted, and where to.
+struct Work<'a> {
+    surface: &'a dyn Surface,
+    ground: &'a ground::Ground,
+    shards: &'a [shards::Shard],
+    shelf: &'a Shelf,
+    columns: &'a Columns,
     room: BuildRoom,
-) -> Result<(Vec<u64>, Sums), StoreError> {
-    let block = room.bytes / 4 / corners::block_bytes(ground.vertices);
-    let scatter = corners::scatter::<I>(surface, &columns.vertex_inputs, shards, shelf, block.max(LEAST_VERTICES))?;
-    let to = triangles::Sorted {
-        positions: &columns.positions,
-        corners: &columns.corners,
-        inputs: &columns.triangle_inputs,
-        valences: &columns.valences,
-    };
-    triangles::sort::<I>(&scatter, &ground.grid, shards, &to)
+}
+
+impl Work<'_> {
+    fn sort<I: identity::Id, C: colors::Color>(
+        &self,
+    ) -> Result<(vertices::SortedVertices, triangles::SortedTriangles), StoreError> {
+        let Work { surface, ground, shards, shelf, columns, room } = *self;
+        // Half is for the shards that are sorted: see `shard_vertices`.
+        let quarter = room.bytes / 4;
+        let to = vertices::Sorted {
+            positions: &columns.positions,
+            inputs: &columns.vertex_inputs,
+            colors: columns.colors.as_ref(),
+        };
+        let vertices = vertices::sort::<I, C>(surface, ground, shards, (shelf, quarter), &to)?;
+        let join = corners::JoinRoom { block: quarter, waiting: quarter };
+        let scatter = corners::scatter::<I>(surface, &columns.vertex_inputs, shards, shelf, join)?;
+        let to = triangles::Sorted {
+            positions: &columns.positions,
+            corners: &columns.corners,
+            inputs: &columns.triangle_inputs,
+            valences: &columns.valences,
+        };
+        Ok((vertices, triangles::sort::<I>(&scatter, &ground.grid, shards, &to)?))
+    }
 }
 
 /// Bytes that an index takes on disk, with the scratch files of its making and the divergence of every vertex.
@@ -212,7 +238,7 @@ pub fn disk_bytes(vertices: u64, triangles: u64, has_colors: bool) -> u64 {
     vertices * (24 + 2 + 8 + number + colors) + triangles * 4 * number + scratch
 }
 
-/// Vertices of a shard or of a block, at least.
+/// Vertices of a shard, at least.
 const LEAST_VERTICES: u64 = 1 << 12;
 
 /// Vertices of a shard: what half of the memory holds, shared by the threads; fewer where that gives each

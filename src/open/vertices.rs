@@ -6,6 +6,7 @@ use super::progress::Progress;
 use super::records::{CHUNK, Records, Source, locate};
 use super::scalar::Scalar;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Names under which colours are written.
 const COLOR_NAMES: [[&str; 3]; 3] =
@@ -187,6 +188,23 @@ impl Vertices {
         }
     }
 
+    /// Hands x, y, z of a range of vertices to `take`, input units.
+    #[inline]
+    pub(super) fn each_position(&self, bytes: &[u8], vertices: Range<u64>, mut take: impl FnMut([f64; 3])) {
+        match (&self.records, self.place) {
+            // Nearly every mesh: plain reads, one stride apart.
+            (Records::Fixed { stride, .. }, Place::Floats(at)) if !vertices.is_empty() => {
+                let first = self.records.at(vertices.start) + at;
+                for i in 0..vertices.end - vertices.start {
+                    let place = first + (i * stride) as usize;
+                    let place = &bytes[place..place + 12];
+                    take([0, 4, 8].map(|i| Scalar::F32.number(&place[i..])));
+                }
+            }
+            _ => vertices.for_each(|v| take(self.position(bytes, v))),
+        }
+    }
+
     /// Type of the colours, if they are read.
     pub(super) fn color_type(&self) -> Option<Scalar> {
         self.color.map(|c| c.scalar)
@@ -198,6 +216,17 @@ impl Vertices {
         let color = self.color?;
         let record = &bytes[self.records.at(vertex)..];
         Some(color.offsets.map(|at| color.scalar.number(&record[at..]) / color.full))
+    }
+
+    /// Red, green and blue of a vertex, 0 to `full`: as they are where `full` is what the file has.
+    #[inline]
+    pub(super) fn color_in(&self, bytes: &[u8], vertex: u64, full: f64) -> Option<[f32; 3]> {
+        let color = self.color?;
+        let record = &bytes[self.records.at(vertex)..];
+        Some(color.offsets.map(|at| {
+            let value = color.scalar.number(&record[at..]);
+            if color.full == full { value as f32 } else { (value / color.full * full) as f32 }
+        }))
     }
 
     /// The bytes of a vertex's numbers, as [`Vertices::scalars`] lists them.

@@ -2,7 +2,7 @@
 
 use super::again::clusters;
 use super::{Survey, TileError};
-use crate::index::CellBlock;
+use crate::index::{CellBlock, Colors};
 use crate::measure::{Grain, Wanted, measure};
 use crate::pipeline::{Crew, LostJob, Reservation, Stages, Stopped, over_jobs};
 use crate::progress::{Progress, Unit};
@@ -194,10 +194,13 @@ impl Survey<'_> {
     /// Colours of a tile's vertices, and what stands for full colour.
     #[allow(clippy::type_complexity, reason = "used once, and named where it is used")]
     fn colors(&self, mesh: &TileMesh) -> Result<Option<(f64, Vec<[f32; 3]>)>, StoreError> {
-        let Some((full, column)) = self.index.colors() else { return Ok(None) };
+        let Some(kept) = self.index.colors() else { return Ok(None) };
         let mut colors = Vec::with_capacity(mesh.positions.len());
-        each_of(column, &mesh.vertex_runs, |c| colors.push(c))?;
-        Ok(Some((full, colors)))
+        match kept {
+            Colors::Bytes(column) => each_of(column, &mesh.vertex_runs, |c| colors.push(c.map(f32::from)))?,
+            Colors::Floats(_, column) => each_of(column, &mesh.vertex_runs, |c| colors.push(c))?,
+        }
+        Ok(Some((kept.full(), colors)))
     }
 
     /// Puts the input's numbers, ascending, in place of the survey's: labels go back onto the input.
