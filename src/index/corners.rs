@@ -41,15 +41,17 @@ impl Block {
         let block = Block { input, low: zeros(len), high: zeros(if wide { len } else { 0 }) };
         (0..inputs.len().div_ceil(PIECE)).into_par_iter().try_for_each(|piece| {
             let mut number = piece * PIECE;
-            inputs.each(number..(number + PIECE).min(inputs.len()), |[input]| {
-                if block.input.contains(&input) {
-                    let at = (input - block.input.start) as usize;
-                    block.low[at].store(number as u32, Ordering::Relaxed);
-                    if let Some(high) = block.high.get(at) {
-                        high.store((number >> 32) as u32, Ordering::Relaxed);
+            inputs.each_slice(number..(number + PIECE).min(inputs.len()), |inputs| {
+                for &[input] in inputs {
+                    let at = input.wrapping_sub(block.input.start);
+                    if at < block.low.len() as u64 {
+                        block.low[at as usize].store(number as u32, Ordering::Relaxed);
+                        if let Some(high) = block.high.get(at as usize) {
+                            high.store((number >> 32) as u32, Ordering::Relaxed);
+                        }
                     }
+                    number += 1;
                 }
-                number += 1;
             })
         })?;
         Ok(block)

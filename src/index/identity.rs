@@ -50,10 +50,11 @@ impl<const N: usize> Numbers<N> {
         Ok(if wide { Numbers::Wide(shelf.open(name, len)?) } else { Numbers::Narrow(shelf.open(name, len)?) })
     }
 
-    pub(super) fn each(&self, range: Range<u64>, mut take: impl FnMut([u64; N])) -> Result<(), StoreError> {
+    /// Hands the numbers of a range to `take`, in order, some at a time.
+    pub(super) fn each_slice(&self, range: Range<u64>, take: impl FnMut(&[[u64; N]])) -> Result<(), StoreError> {
         match self {
-            Numbers::Narrow(column) => column.each(range, |numbers| take(numbers.map(u64::from))),
-            Numbers::Wide(column) => column.each(range, take),
+            Numbers::Narrow(column) => column.each_slice(range, |numbers| numbers.map(u64::from), take),
+            Numbers::Wide(column) => column.each_slice(range, |numbers| numbers, take),
         }
     }
 

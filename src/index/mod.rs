@@ -32,7 +32,7 @@ pub use scale::Scale;
 
 use crate::geometry::{DVec3, ExactSum};
 use crate::open::Surface;
-use crate::store::{Column, Shelf, StoreError};
+use crate::store::{Column, Element, Shelf, StoreError};
 use identity::Numbers;
 use seal::Seal;
 use std::ops::Range;
@@ -69,10 +69,22 @@ pub struct Index {
     seals: Vec<Seal>,
 }
 
+impl Element for DVec3 {
+    const BYTES: usize = 24;
+    #[inline(always)]
+    fn put(self, to: &mut [u8]) {
+        self.to_array().put(to);
+    }
+    #[inline(always)]
+    fn get(from: &[u8]) -> DVec3 {
+        DVec3::from_array(Element::get(from))
+    }
+}
+
 /// What the index keeps on disk.
 #[derive(Debug)]
 struct Columns {
-    positions: Column<[f64; 3]>,
+    positions: Column<DVec3>,
     valences: Column<u16>,
     corners: Numbers<3>,
     vertex_inputs: Numbers<1>,
@@ -149,16 +161,16 @@ impl Index {
         })
     }
 
-    /// Hands the corners of a range of triangles to `take`, in order.
+    /// Hands the corners of a range of triangles to `take`, in order, some at a time.
     ///
     /// # Errors
     /// The disk says no.
-    pub fn each_corners(&self, triangles: Range<u64>, take: impl FnMut([u64; 3])) -> Result<(), StoreError> {
-        self.columns.corners.each(triangles, take)
+    pub fn each_corners(&self, triangles: Range<u64>, take: impl FnMut(&[[u64; 3]])) -> Result<(), StoreError> {
+        self.columns.corners.each_slice(triangles, take)
     }
 
     /// Positions of vertices, local metres.
-    pub fn positions(&self) -> &Column<[f64; 3]> {
+    pub fn positions(&self) -> &Column<DVec3> {
         &self.columns.positions
     }
 
@@ -179,7 +191,7 @@ impl Index {
     /// The disk says no.
     pub fn triangle_inputs(&self, triangles: Range<u64>) -> Result<Vec<u64>, StoreError> {
         let mut found = Vec::with_capacity((triangles.end - triangles.start) as usize);
-        self.columns.triangle_inputs.each(triangles, |[input]| found.push(input))?;
+        self.columns.triangle_inputs.each_slice(triangles, |inputs| found.extend_from_slice(inputs.as_flattened()))?;
         Ok(found)
     }
 
@@ -189,7 +201,7 @@ impl Index {
     /// The disk says no.
     pub fn vertex_inputs(&self, vertices: Range<u64>) -> Result<Vec<u64>, StoreError> {
         let mut found = Vec::with_capacity((vertices.end - vertices.start) as usize);
-        self.columns.vertex_inputs.each(vertices, |[input]| found.push(input))?;
+        self.columns.vertex_inputs.each_slice(vertices, |inputs| found.extend_from_slice(inputs.as_flattened()))?;
         Ok(found)
     }
 }

@@ -6,7 +6,6 @@
 use super::identity::{Id, Numbers};
 use super::order::Sorter;
 use super::shards::{Shard, by_cell, holding, of_rows};
-use super::vertices::points;
 use super::{CellGrid, Sums};
 use crate::geometry::{DVec3, triangle_area, triangle_centroid};
 use crate::store::{Column, Scatter, StoreError};
@@ -31,7 +30,7 @@ struct Arriving<I> {
 
 /// Where the sorted triangles go.
 pub(super) struct Sorted<'a> {
-    pub(super) positions: &'a Column<[f64; 3]>,
+    pub(super) positions: &'a Column<DVec3>,
     pub(super) corners: &'a Numbers<3>,
     pub(super) inputs: &'a Numbers<1>,
     pub(super) valences: &'a Column<u16>,
@@ -126,9 +125,10 @@ fn prepare<I: Id>(
     blocks: Vec<Vec<[I; 4]>>,
     grid: &CellGrid,
     shard: &Shard,
-    positions: &Column<[f64; 3]>,
+    positions: &Column<DVec3>,
 ) -> Result<Prepared<I>, StoreError> {
-    let near = points(positions, shard.window.clone())?;
+    let mut near = Vec::new();
+    positions.read(shard.window.clone(), &mut near)?;
     let far = Far::read(blocks.iter().flatten(), shard, positions)?;
     let place = |v: u64| match near.get((v - shard.window.start) as usize) {
         Some(&p) => p,
@@ -215,7 +215,7 @@ impl Far {
     fn read<'a, I: Id + 'a>(
         records: impl Iterator<Item = &'a [I; 4]>,
         shard: &Shard,
-        column: &Column<[f64; 3]>,
+        column: &Column<DVec3>,
     ) -> Result<Far, StoreError> {
         let corners = records.flat_map(|&[_, a, b, c]| [a, b, c].map(Id::number));
         let mut vertices: Vec<u64> = corners.filter(|&v| v >= shard.window.end).collect();
@@ -223,7 +223,7 @@ impl Far {
         vertices.dedup();
         let mut positions = Vec::with_capacity(vertices.len());
         for &v in &vertices {
-            column.each(v..v + 1, |p| positions.push(DVec3::from_array(p)))?;
+            column.read(v..v + 1, &mut positions)?;
         }
         Ok(Far { vertices, positions })
     }

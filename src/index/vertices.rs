@@ -17,7 +17,7 @@ struct Record<I, C> {
     cell: u32,
     input: I,
     color: C,
-    position: [f64; 3],
+    position: DVec3,
 }
 
 impl<I: Id, C: Color> Element for Record<I, C> {
@@ -33,7 +33,7 @@ impl<I: Id, C: Color> Element for Record<I, C> {
     fn get(from: &[u8]) -> Self {
         Record {
             cell: u32::get(&from[..4]),
-            position: Element::get(&from[4..28]),
+            position: DVec3::get(&from[4..28]),
             input: I::get(&from[28..28 + I::BYTES]),
             color: C::get(&from[28 + I::BYTES..]),
         }
@@ -45,7 +45,7 @@ pub(super) const SORTING_BYTES: u64 = 2 * size_of::<Record<u64, [f32; 3]>>() as 
 
 /// Where the sorted vertices go.
 pub(super) struct Sorted<'a> {
-    pub(super) positions: &'a Column<[f64; 3]>,
+    pub(super) positions: &'a Column<DVec3>,
     pub(super) inputs: &'a Numbers<1>,
     pub(super) colors: Option<&'a Colors>,
 }
@@ -87,7 +87,7 @@ pub(super) fn sort<I: Id, C: Color>(
                         let shard = of_rows[row as usize] as usize;
                         let cell = grid.number([column, row - shards[shard].rows.start]) as u32;
                         let (input, color) = (I::of(input), C::of(color));
-                        writer.put(shard, Record { cell, input, color, position: p.to_array() })?;
+                        writer.put(shard, Record { cell, input, color, position: p })?;
                     }
                 }
             }
@@ -125,8 +125,8 @@ fn sort_shard<I: Id, C: Color>(
     let mut sorter = Sorter::default();
     for cell in start.windows(2) {
         let records = &records[cell[0] as usize..cell[1] as usize];
-        let key = |r: &Record<I, C>| (r.position.map(ascending), r.input);
-        for i in sorter.places(records, |r| ascending(r.position[0]), |a, b| key(a).cmp(&key(b))) {
+        let key = |r: &Record<I, C>| (r.position.to_array().map(ascending), r.input);
+        for i in sorter.places(records, |r| ascending(r.position.x), |a, b| key(a).cmp(&key(b))) {
             positions.put(records[i].position)?;
             inputs.put([records[i].input.number()])?;
             if let Some(colors) = &mut colors {
@@ -143,11 +143,4 @@ fn ascending(x: f64) -> u64 {
     // -0.0 and 0.0 are one place.
     let bits = (x + 0.0).to_bits();
     if bits >> 63 == 1 { !bits } else { bits | 1 << 63 }
-}
-
-/// Reads positions as points.
-pub(super) fn points(column: &Column<[f64; 3]>, range: std::ops::Range<u64>) -> Result<Vec<DVec3>, StoreError> {
-    let mut found = Vec::with_capacity((range.end - range.start) as usize);
-    column.each(range, |p| found.push(DVec3::from_array(p)))?;
-    Ok(found)
 }

@@ -135,7 +135,9 @@ impl Vertices {
             .into_par_iter()
             .map(|chunk| {
                 let (first, last) = (chunk * CHUNK, ((chunk + 1) * CHUNK).min(self.count));
-                let bounds = (first..last).fold(VertexBounds::EMPTY, |b, v| self.look(source.bytes, b, v));
+                let bounds = self.plain_bounds(source.bytes, first..last);
+                let bounds = bounds
+                    .unwrap_or_else(|| (first..last).fold(VertexBounds::EMPTY, |b, v| self.look(source.bytes, b, v)));
                 source.passed(progress, (self.records.at(last - 1) - self.records.at(first)) as u64);
                 bounds
             })
@@ -149,6 +151,22 @@ impl Vertices {
             self.color_refused = Some(format!("vertex {vertex} has a float colour outside 0 to 1"));
         }
         Ok((bounds.min, bounds.max))
+    }
+
+    /// Bounds of vertices of which nothing else need be told; none if something must.
+    fn plain_bounds(&self, bytes: &[u8], vertices: Range<u64>) -> Option<VertexBounds> {
+        if self.color.is_some_and(|c| !c.scalar.is_integer()) {
+            return None;
+        }
+        let (mut bounds, mut finite) = (VertexBounds::EMPTY, true);
+        self.each_position(bytes, vertices, |p| {
+            for (axis, &value) in p.iter().enumerate() {
+                bounds.min[axis] = bounds.min[axis].min(value);
+                bounds.max[axis] = bounds.max[axis].max(value);
+                finite &= value.is_finite();
+            }
+        });
+        finite.then_some(bounds)
     }
 
     #[inline]

@@ -65,6 +65,9 @@ impl<T: Element, const N: usize> Element for [T; N] {
 /// Elements converted at a time: their bytes stay in the processor's cache.
 const PIECE_BYTES: usize = 1 << 17;
 
+/// Elements that are handed over at a time.
+const SLICE: usize = 1 << 10;
+
 thread_local! {
     /// Pieces of [`PIECE_BYTES`] that are not in use. Columns are read in many short runs, and fresh memory costs
     /// more than reading them.
@@ -136,27 +139,25 @@ impl<T: Element> Column<T> {
         self.len == 0
     }
 
-    /// Hands the elements of a range to `take`, in order.
+    /// Hands the elements of a range, converted, to `take`, in order, some at a time.
     ///
     /// # Errors
     /// The file cannot be read.
-    #[inline]
-    pub fn each(&self, range: Range<u64>, mut take: impl FnMut(T)) -> Result<(), StoreError> {
-        let step = (PIECE_BYTES / T::BYTES) as u64;
-        let mut piece = Piece::new();
-        let mut at = range.start;
-        while at < range.end {
-            let n = step.min(range.end - at);
-            let part = &mut piece.0[..n as usize * T::BYTES];
-            self.read_bytes(part, at * T::BYTES as u64)?;
-            part.chunks_exact(T::BYTES).for_each(|element| take(T::get(element)));
-            at += n;
-        }
-        Ok(())
-    }
-
-    fn read_bytes(&self, bytes: &mut [u8], at: u64) -> Result<(), StoreError> {
-        self.file.read_exact_at(bytes, at).map_err(|e| StoreError::io(&self.path, "read the column", e))
+    pub fn each_slice<U>(
+        &self,
+        range: Range<u64>,
+        convert: impl Fn(T) -> U,
+        mut take: impl FnMut(&[U]),
+    ) -> Result<(), StoreError> {
+        let n = range.end.saturating_sub(range.start) as usize;
+        let mut slice = Vec::with_capacity(n.min(SLICE));
+        self.each_piece(range, |bytes| {
+            for some in bytes.chunks(SLICE * T::BYTES) {
+                slice.clear();
+                slice.extend(some.chunks_exact(T::BYTES).map(|element| convert(T::get(element))));
+                take(&slice);
+            }
+        })
     }
 
     /// Appends the elements of a range.
@@ -165,7 +166,25 @@ impl<T: Element> Column<T> {
     /// The file cannot be read.
     pub fn read(&self, range: Range<u64>, to: &mut Vec<T>) -> Result<(), StoreError> {
         to.reserve(range.end.saturating_sub(range.start) as usize);
-        self.each(range, |element| to.push(element))
+        self.each_piece(range, |bytes| to.extend(bytes.chunks_exact(T::BYTES).map(T::get)))
+    }
+
+    fn each_piece(&self, range: Range<u64>, mut take: impl FnMut(&[u8])) -> Result<(), StoreError> {
+        let step = (PIECE_BYTES / T::BYTES) as u64;
+        let mut piece = Piece::new();
+        let mut at = range.start;
+        while at < range.end {
+            let n = step.min(range.end - at);
+            let part = &mut piece.0[..n as usize * T::BYTES];
+            self.read_bytes(part, at * T::BYTES as u64)?;
+            take(part);
+            at += n;
+        }
+        Ok(())
+    }
+
+    fn read_bytes(&self, bytes: &mut [u8], at: u64) -> Result<(), StoreError> {
+        self.file.read_exact_at(bytes, at).map_err(|e| StoreError::io(&self.path, "read the column", e))
     }
 
     /// Writes elements from number `first` on.
