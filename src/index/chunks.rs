@@ -15,7 +15,7 @@ const RELEASE: u64 = 32;
 /// Hands 0..`n` to `work` in chunks. Every thread makes its own state with `start`.
 ///
 /// Chunks come in no particular order, so `work` must not care. What was read of the surface is let go as
-/// the pass goes on.
+/// the pass goes on, but for what the next pass may read first.
 pub(super) fn over_chunks<S>(
     surface: &dyn Surface,
     n: u64,
@@ -47,7 +47,6 @@ pub(super) fn over_chunks_then<S>(
             }
         }
     });
-    surface.release();
     done.into_iter().collect()
 }
 

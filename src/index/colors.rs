@@ -102,7 +102,7 @@ pub(super) enum ColorsWriter<'a> {
 }
 
 impl ColorsWriter<'_> {
-    #[inline]
+    #[inline(always)]
     pub(super) fn put<C: Color>(&mut self, color: C) -> Result<(), StoreError> {
         match self {
             ColorsWriter::Bytes(writer) => writer.put(Color::of(color.raw())),

@@ -98,7 +98,7 @@ pub(super) enum NumbersWriter<'a, const N: usize> {
 }
 
 impl<const N: usize> NumbersWriter<'_, N> {
-    #[inline]
+    #[inline(always)]
     pub(super) fn put(&mut self, numbers: [u64; N]) -> Result<(), StoreError> {
         match self {
             NumbersWriter::Narrow(writer) => writer.put(numbers.map(u32::of)),

@@ -147,6 +147,7 @@ impl Index {
             (true, true) => work.sort::<u64, [u8; 3]>()?,
             (true, false) => work.sort::<u64, [f32; 3]>()?,
         };
+        surface.release();
         let scale = triangles.sums.scale(&ground, surface.triangles());
         if scale.mean_triangle_area_m2 <= 0.0 {
             return Err(IndexError::NoArea { triangles: scale.triangles });
@@ -252,14 +253,19 @@ pub fn disk_bytes(vertices: u64, triangles: u64, has_colors: bool) -> u64 {
 
 /// Vertices of a shard, at least.
 const LEAST_VERTICES: u64 = 1 << 12;
+/// Vertices of a shard that the processor's cache holds, with their triangles.
+const CACHED_VERTICES: u64 = 1 << 15;
+/// More shards than this would leave the disk with pieces that are too small.
+const MOST_CACHED_SHARDS: u64 = 256;
 
 /// Vertices of a shard: what half of the memory holds, shared by the threads; fewer where that gives each
-/// thread several to choose from.
+/// thread several to choose from, or where the processor's cache then holds a shard.
 fn shard_vertices(vertices: u64, room: BuildRoom) -> u64 {
     let threads = rayon::current_num_threads() as u64;
     let width = if room.wide { 2 } else { 1 };
     let each = vertices::SORTING_BYTES.max(2 * width * triangles::SORTING_BYTES);
-    (room.bytes / 2 / threads / each).min(vertices / (4 * threads)).max(LEAST_VERTICES)
+    let cached = CACHED_VERTICES.max(vertices / MOST_CACHED_SHARDS);
+    (room.bytes / 2 / threads / each).min(vertices / (4 * threads)).min(cached).max(LEAST_VERTICES)
 }
 
 /// Sums over all triangles, and what they give.

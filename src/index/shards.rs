@@ -61,19 +61,19 @@ pub(super) fn by_cell<T: Copy + Default, P: Iterator<Item = (u32, T)>>(
     // One place further on than where they belong: putting the elements moves them back.
     let mut start = vec![0u32; cells + 2];
     let mut n = 0;
-    for (cell, _) in parts() {
+    parts().for_each(|(cell, _)| {
         start[cell as usize + 2] += 1;
         n += 1;
-    }
+    });
     for cell in 2..cells + 2 {
         start[cell] += start[cell - 1];
     }
     let mut placed = vec![T::default(); n];
-    for (cell, element) in parts() {
+    parts().for_each(|(cell, element)| {
         let place = &mut start[cell as usize + 1];
         placed[*place as usize] = element;
         *place += 1;
-    }
+    });
     start.truncate(cells + 1);
     (placed, start)
 }

@@ -138,7 +138,7 @@ fn prepare<I: Id>(
     let (mut beyond, mut corners_beyond, mut sums) = (Vec::new(), Vec::new(), Sums::NOTHING);
     let mut valences = vec![0u16; (shard.vertices.end - shard.vertices.start) as usize];
     let of_shard = shard.cells(grid);
-    for &record in blocks.iter().flatten() {
+    blocks.iter().flatten().for_each(|&record| {
         let numbers = [record[1].number(), record[2].number(), record[3].number()];
         let corners = numbers.map(place);
         let cell = grid.number(grid.cell_of(triangle_centroid(corners)));
@@ -155,7 +155,7 @@ fn prepare<I: Id>(
                 None => corners_beyond.push(v),
             }
         }
-    }
+    });
     Ok(Prepared { blocks, cells, beyond, valences, corners_beyond, sums })
 }
 

@@ -137,6 +137,23 @@ impl Reach {
         }
     }
 
+    /// Puts the colours of a range of vertices, as [`Reach::raw_color`] has them, in place of what `to` holds.
+    ///
+    /// # Panics
+    /// Above the last vertex.
+    pub fn raw_colors(&self, vertices: Range<u64>, to: &mut Vec<[f32; 3]>) {
+        to.clear();
+        match self.full_color {
+            None => to.resize(vertices.end.saturating_sub(vertices.start) as usize, [0.0; 3]),
+            Some(full) => {
+                for file in &self.files {
+                    let (bytes, of_file) = (file.mesh.bytes(), within(&vertices, file.first_vertex, file.vertices()));
+                    to.extend(of_file.map(|v| file.mesh.vertices.color_in(bytes, v, full).unwrap_or_default()));
+                }
+            }
+        }
+    }
+
     /// Puts the vertices of a range of triangles in place of what `to` holds: quicker than one by one.
     ///
     /// # Panics
@@ -218,8 +235,9 @@ impl Reach {
                 }
             }
             // Corners may lie anywhere in the file, and every page that is touched brings its neighbours.
-            self.release();
+            file.mesh.release_if_large();
         }
+        file.mesh.release();
         (edges > 0).then(|| sum / f64::from(edges))
     }
 

@@ -70,6 +70,9 @@ impl Surface for Reach {
     fn positions(&self, vertices: Range<u64>, to: &mut Vec<DVec3>) {
         self.positions(vertices, to);
     }
+    fn raw_colors(&self, vertices: Range<u64>, to: &mut Vec<[f32; 3]>) {
+        self.raw_colors(vertices, to);
+    }
     fn corner_numbers(&self, triangles: Range<u64>, to: &mut Vec<[u64; 3]>) {
         self.corner_numbers(triangles, to);
     }

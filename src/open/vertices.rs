@@ -236,15 +236,16 @@ impl Vertices {
         Some(color.offsets.map(|at| color.scalar.number(&record[at..]) / color.full))
     }
 
-    /// Red, green and blue of a vertex, 0 to `full`: as they are where `full` is what the file has.
+    /// Red, green and blue of a vertex, 0 to `full`. Bytes that are to be of 255 parts stay what they are: 255 times a
+    /// 255th rounds to one.
     #[inline]
     pub(super) fn color_in(&self, bytes: &[u8], vertex: u64, full: f64) -> Option<[f32; 3]> {
         let color = self.color?;
         let record = &bytes[self.records.at(vertex)..];
-        Some(color.offsets.map(|at| {
-            let value = color.scalar.number(&record[at..]);
-            if color.full == full { value as f32 } else { (value / color.full * full) as f32 }
-        }))
+        if color.scalar == Scalar::U8 && full == color.full {
+            return Some(color.offsets.map(|at| f32::from(record[at])));
+        }
+        Some(color.offsets.map(|at| (color.scalar.number(&record[at..]) / color.full * full) as f32))
     }
 
     /// The bytes of a vertex's numbers, as [`Vertices::scalars`] lists them.
