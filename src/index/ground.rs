@@ -2,7 +2,7 @@
 //!
 //! Only what triangles use counts: a stray vertex far away must not stretch the grid.
 
-use super::cells::CellGrid;
+use super::cells::{CellGrid, Steps};
 use super::chunks::{over_chunks, over_chunks_then, pieces};
 use crate::geometry::DVec3;
 use crate::open::Surface;
@@ -74,7 +74,10 @@ pub(super) fn look(surface: &dyn Surface) -> Result<Ground, StoreError> {
         },
     )?;
     let vertices = used.count();
-    let (min, max) = bounds(surface, &used)?;
+    let (min, max) = match surface.bounds() {
+        Some(of_all) if vertices == surface.vertices() => of_all,
+        _ => bounds(surface, &used)?,
+    };
     let area_m2 = area_in_plan(surface, &used, vertices, (min, max))?;
     let triangles = surface.triangles();
     let grid = CellGrid::over(min, max, triangles, area_m2 / triangles.max(1) as f64, TRIANGLES_PER_CELL);
@@ -122,11 +125,12 @@ fn bounds(surface: &dyn Surface, used: &Bits) -> Result<(DVec3, DVec3), StoreErr
 
 /// Vertices in each row of cells.
 fn in_rows(surface: &dyn Surface, used: &Bits, grid: &CellGrid) -> Result<Vec<u64>, StoreError> {
+    let finder = grid.finder();
     each_used(
         surface,
         used,
         vec![0; grid.rows as usize],
-        |in_row, p| in_row[grid.cell_of(p)[1] as usize] += 1,
+        |in_row, p| in_row[finder.row_of(p) as usize] += 1,
         |in_row, of_thread| in_row.iter_mut().zip(of_thread).for_each(|(all, n)| *all += n),
     )
 }
@@ -141,12 +145,12 @@ fn area_in_plan(
     let squares = ((vertices / VERTICES_PER_SQUARE) as f64).clamp(1.0, MOST_SQUARES);
     let (width, height) = ((max.x - min.x).max(1e-9), (max.y - min.y).max(1e-9));
     let side = (width * height / squares).sqrt().max(width.max(height) / squares);
-    let columns = (width / side).floor() as u64 + 1;
-    let rows = (height / side).floor() as u64 + 1;
-    let occupied = Bits::new(columns * rows);
-    let place = |x: f64, min: f64, n: u64| (((x - min) / side) as u64).min(n - 1);
+    let columns = (width / side).floor() as u32 + 1;
+    let rows = (height / side).floor() as u32 + 1;
+    let occupied = Bits::new(u64::from(columns) * u64::from(rows));
+    let (east, north) = (Steps::new(min.x, side, columns), Steps::new(min.y, side, rows));
     let look = |(): &mut (), p: DVec3| {
-        occupied.set(place(p.y, min.y, rows) * columns + place(p.x, min.x, columns));
+        occupied.set(u64::from(north.of(p.y)) * u64::from(columns) + u64::from(east.of(p.x)));
     };
     each_used(surface, used, (), look, |(), ()| ())?;
     Ok((occupied.count() as f64 * side * side).min(width * height))

@@ -10,7 +10,7 @@
 //! ```
 //!
 //! Memory does not grow with the survey but for a bit for each vertex and 16 bytes for each cell (of about 64
-//! triangles). On disk it takes about 45 bytes for each triangle.
+//! triangles). On disk it takes about 35 bytes for each triangle.
 
 mod cells;
 mod chunks;
@@ -242,12 +242,15 @@ impl Work<'_> {
     }
 }
 
-/// Bytes that an index takes on disk, with the scratch files of its making and the divergence of every vertex.
-pub fn disk_bytes(vertices: u64, triangles: u64, has_colors: bool) -> u64 {
+/// Bytes that an index takes on disk, with the scratch files of its making, if none of them fits into memory, and the
+/// divergence of every vertex.
+pub fn disk_bytes(vertices: u64, triangles: u64, full_color: Option<f64>) -> u64 {
     let wide = vertices.max(triangles) > u64::from(u32::MAX);
     let number = if wide { 8 } else { 4 };
-    let colors = if has_colors { 12 } else { 0 };
-    let scratch = (vertices * 48).max(triangles * 4 * number);
+    let bytes = full_color.is_none_or(Colors::are_bytes);
+    let waiting = 28 + number + if bytes { 3 } else { 12 };
+    let colors = if full_color.is_none() { 0 } else { waiting - 28 - number };
+    let scratch = (vertices * waiting).max(triangles * 4 * number);
     vertices * (24 + 2 + 8 + number + colors) + triangles * 4 * number + scratch
 }
 

@@ -137,11 +137,11 @@ fn prepare<I: Id>(
     let mut cells = Vec::with_capacity(blocks.iter().map(Vec::len).sum());
     let (mut beyond, mut corners_beyond, mut sums) = (Vec::new(), Vec::new(), Sums::NOTHING);
     let mut valences = vec![0u16; (shard.vertices.end - shard.vertices.start) as usize];
-    let of_shard = shard.cells(grid);
+    let (of_shard, finder) = (shard.cells(grid), grid.finder());
     blocks.iter().flatten().for_each(|&record| {
         let numbers = [record[1].number(), record[2].number(), record[3].number()];
         let corners = numbers.map(place);
-        let cell = grid.number(grid.cell_of(triangle_centroid(corners)));
+        let cell = grid.number(finder.cell_of(triangle_centroid(corners)));
         sums.add(corners, triangle_area(corners));
         if of_shard.contains(&cell) {
             cells.push((cell - of_shard.start) as u32);
@@ -217,8 +217,10 @@ impl Far {
         shard: &Shard,
         column: &Column<DVec3>,
     ) -> Result<Far, StoreError> {
-        let corners = records.flat_map(|&[_, a, b, c]| [a, b, c].map(Id::number));
-        let mut vertices: Vec<u64> = corners.filter(|&v| v >= shard.window.end).collect();
+        let mut vertices = Vec::new();
+        records.for_each(|&[_, a, b, c]| {
+            vertices.extend([a, b, c].map(Id::number).into_iter().filter(|&v| v >= shard.window.end));
+        });
         vertices.sort_unstable();
         vertices.dedup();
         let mut positions = Vec::with_capacity(vertices.len());

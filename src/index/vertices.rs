@@ -10,6 +10,7 @@ use crate::geometry::DVec3;
 use crate::open::Surface;
 use crate::store::{Column, Element, Scatter, Shelf, StoreError};
 use rayon::prelude::*;
+use std::cmp::Ordering;
 
 /// A vertex on its way to its shard.
 #[derive(Clone, Copy, Default)]
@@ -71,7 +72,7 @@ pub(super) fn sort<I: Id, C: Color>(
     to: &Sorted,
 ) -> Result<SortedVertices, StoreError> {
     let scatter = Scatter::<Record<I, C>>::new(shelf, "vertices", shards.len(), room)?;
-    let grid = &ground.grid;
+    let (grid, finder) = (&ground.grid, ground.grid.finder());
     let of_rows = of_rows(shards);
     over_chunks_then(
         surface,
@@ -83,7 +84,7 @@ pub(super) fn sort<I: Id, C: Color>(
                 surface.raw_colors(piece.clone(), colors);
                 for (input, (&p, &color)) in piece.zip(positions.iter().zip(&*colors)) {
                     if ground.used.get(input) {
-                        let [column, row] = grid.cell_of(p);
+                        let [column, row] = finder.cell_of(p);
                         let shard = of_rows[row as usize] as usize;
                         let cell = grid.number([column, row - shards[shard].rows.start]) as u32;
                         let (input, color) = (I::of(input), C::of(color));
@@ -125,8 +126,13 @@ fn sort_shard<I: Id, C: Color>(
     let mut sorter = Sorter::default();
     for cell in start.windows(2) {
         let records = &records[cell[0] as usize..cell[1] as usize];
-        let key = |r: &Record<I, C>| (r.position.to_array().map(ascending), r.input);
-        for i in sorter.places(records, |r| ascending(r.position.x), |a, b| key(a).cmp(&key(b))) {
+        // Coordinates are finite, so that one is the lower or both are the same place.
+        let exact = |a: &Record<I, C>, b: &Record<I, C>| {
+            let (p, q) = (a.position, b.position);
+            let order = (p.x, p.y, p.z, a.input).partial_cmp(&(q.x, q.y, q.z, b.input));
+            order.unwrap_or(Ordering::Equal)
+        };
+        for i in sorter.places(records, |r| ascending(r.position.x), exact) {
             positions.put(records[i].position)?;
             inputs.put([records[i].input.number()])?;
             if let Some(colors) = &mut colors {

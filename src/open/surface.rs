@@ -15,6 +15,10 @@ pub trait Surface: Sync {
     fn triangles(&self) -> u64;
     /// Position of a vertex, local metres.
     fn position(&self, vertex: u64) -> DVec3;
+    /// Lowest and highest corner of the box of all vertices, local metres, where it is known.
+    fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        None
+    }
     /// The three vertices of a triangle, counter-clockwise seen from outside.
     fn triangle(&self, triangle: u64) -> [u64; 3];
     /// What stands for full colour in [`Surface::raw_color`], if the survey has colours. Where it is 255, colours are
@@ -57,6 +61,11 @@ impl Surface for Reach {
     }
     fn position(&self, vertex: u64) -> DVec3 {
         self.position(vertex)
+    }
+    fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        // Subtraction and multiplication round without changing which is lower.
+        let (min, max) = self.input_bounds();
+        Some((self.frame().local(min), self.frame().local(max)))
     }
     fn triangle(&self, triangle: u64) -> [u64; 3] {
         self.triangle(triangle)
