@@ -81,6 +81,7 @@ impl ExactSum {
     const SCALE: f64 = 18_446_744_073_709_551_616.0;
 
     /// Adds one term.
+    #[inline]
     pub fn add(&mut self, term: f64) {
         self.0 += fixed(term);
     }

@@ -282,6 +282,7 @@ struct Sums {
 impl Sums {
     const NOTHING: Sums = Sums { area: ExactSum::ZERO, edges: ExactSum::ZERO, zero_area: 0 };
 
+    #[inline(always)]
     fn add(&mut self, c: [DVec3; 3], area_m2: f64) {
         self.area.add(area_m2);
         self.zero_area += u64::from(area_m2 == 0.0);

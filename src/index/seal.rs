@@ -18,13 +18,11 @@ pub(super) struct Seal {
 /// Seals of all shards, from the checksums of their vertices (positions, inputs, colours) and of their triangles
 /// (valences, corners, inputs).
 pub(super) fn of_shards(shards: &[Shard], vertices: &[[u64; 3]], triangles: Vec<(Range<u64>, [u64; 3])>) -> Vec<Seal> {
-    let parts = shards.iter().zip(vertices).zip(triangles);
-    let seal = |((shard, &[a, b, c]), (triangles, [d, e, f])): ((&Shard, &[u64; 3]), (Range<u64>, [u64; 3]))| Seal {
-        vertices: shard.vertices.clone(),
-        triangles,
-        checksums: [a, b, c, d, e, f],
-    };
-    parts.map(seal).collect()
+    let mut seals = Vec::with_capacity(shards.len());
+    for ((shard, &[a, b, c]), (triangles, [d, e, f])) in shards.iter().zip(vertices).zip(triangles) {
+        seals.push(Seal { vertices: shard.vertices.clone(), triangles, checksums: [a, b, c, d, e, f] });
+    }
+    seals
 }
 
 impl Seal {
