@@ -100,7 +100,7 @@ pub fn room(reach: &Reach, memory: u64) -> Result<BuildRoom, ForecastError> {
 /// # Errors
 /// The disk has less.
 pub fn disk(reach: &Reach, folder: &str, free: Option<u64>) -> Result<u64, ForecastError> {
-    let needed = disk_bytes(reach.vertices(), reach.triangles(), reach.has_colors());
+    let needed = disk_bytes(reach.vertices(), reach.triangles(), reach.full_color());
     match free {
         Some(free) if free < needed => Err(ForecastError::Disk { folder: folder.to_owned(), needed, free }),
         _ => Ok(needed),

@@ -19,7 +19,7 @@ use gravelometer::segment::{Settled, segment};
 use gravelometer::settings::{AreaRule, ConcaveRule, CurvatureSettings, SegmentSettings};
 use gravelometer::stitch::{Catalogue, TileReport, stitch};
 use gravelometer::store::{Column, Shelf};
-use gravelometer::tile::{CoreSize, Owned, Plan, TileMesh, each_of};
+use gravelometer::tile::{CoreSize, Owned, Plan, TileMesh, read_of};
 use std::convert::Infallible;
 use support::bed::{Rng, bed, shuffled};
 
@@ -223,8 +223,7 @@ fn every_recipe_gives_the_same_catalogue_bit_for_bit_whatever_the_tiles_threads_
 
 /// States after every step, the grains by global triangle ids, and what was found.
 fn segmented(worked: &Worked, recipe: &SegmentSettings, mesh: &TileMesh) -> (Vec<Vec<State>>, Vec<Vec<u64>>, Settled) {
-    let mut divergence = Vec::new();
-    each_of(&worked.divergence, &mesh.vertex_runs, |d| divergence.push(d)).unwrap();
+    let divergence = read_of(&worked.divergence, &mesh.vertex_runs).unwrap();
     let mut states = Vec::new();
     let found = segment(mesh, &divergence, &worked.index.scale, recipe, &mut |_, s| states.push(s.to_vec()));
     let ids = |t: &u32| mesh.triangle_id(*t);

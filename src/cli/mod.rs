@@ -83,7 +83,7 @@ pub struct RunArgs {
     /// Go on where an interrupted run in OUT stopped (also after a crash or a full disk); begin if there is none
     #[arg(long)]
     pub resume: bool,
-    /// Folder for the index and what else is needed again, about 70 bytes for each triangle; it is kept, so that
+    /// Folder for the index and what else is needed again, about 55 bytes for each triangle; it is kept, so that
     /// later runs on the same survey with other settings are quicker [default: in OUT, removed at the end]
     #[arg(long, value_name = "DIR")]
     pub work_dir: Option<PathBuf>,

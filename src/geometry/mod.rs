@@ -81,6 +81,7 @@ impl ExactSum {
     const SCALE: f64 = 18_446_744_073_709_551_616.0;
 
     /// Adds one term.
+    #[inline]
     pub fn add(&mut self, term: f64) {
         self.0 += fixed(term);
     }
@@ -98,15 +99,21 @@ impl ExactSum {
 
 /// A finite number below 2^62 in size, times 2^64, cut off to a whole one. The conversion that the language has
 /// goes through a slow library function.
+#[inline]
 fn fixed(term: f64) -> i128 {
     let bits = term.to_bits();
     // What is too small for an implicit leading bit is far below 2^-64.
     let exponent = (bits >> 52 & 0x7ff) as i32;
-    let mantissa = i128::from(bits & ((1 << 52) - 1) | 1 << 52);
-    let size = match exponent - 1075 + 64 {
-        up @ 0..=75 => mantissa << up,
-        down @ -63..0 => mantissa >> -down,
-        _ => 0,
+    let mantissa = bits & ((1 << 52) - 1) | 1 << 52;
+    let up = exponent - 1075 + 64;
+    let size = if up <= 11 {
+        // Below 1, as lengths and areas of triangles are: 64 bits are enough, and nothing depends on the number.
+        let down = (11 - up) as u32;
+        i128::from((mantissa << 11).checked_shr(down).unwrap_or(0))
+    } else if up <= 75 {
+        i128::from(mantissa) << up
+    } else {
+        0
     };
     if bits >> 63 == 1 { -size } else { size }
 }

@@ -54,10 +54,12 @@ impl CellGrid {
         self.len() == 0
     }
 
-    /// Column and row of a point; points beyond the border belong to the border cells.
-    pub fn cell_of(&self, p: DVec3) -> [u32; 2] {
-        let place = |x: f64, min: f64, n: u32| (((x - min) / self.cell_m).floor().max(0.0) as u32).min(n - 1);
-        [place(p.x, self.min[0], self.columns), place(p.y, self.min[1], self.rows)]
+    /// What finds the cells of points.
+    pub(super) fn finder(&self) -> CellFinder {
+        CellFinder {
+            columns: Steps::new(self.min[0], self.cell_m, self.columns),
+            rows: Steps::new(self.min[1], self.cell_m, self.rows),
+        }
     }
 
     /// Row-major number of a cell.
@@ -100,6 +102,59 @@ impl CellGrid {
             min: [side(0, block.columns.start), side(1, block.rows.start)],
             max: [side(0, block.columns.end), side(1, block.rows.end)],
         }
+    }
+}
+
+/// Finds the cells of points.
+#[derive(Clone, Copy)]
+pub(super) struct CellFinder {
+    columns: Steps,
+    rows: Steps,
+}
+
+impl CellFinder {
+    /// Column and row of a point; points beyond the border belong to the border cells.
+    #[inline]
+    pub(super) fn cell_of(&self, p: DVec3) -> [u32; 2] {
+        [self.columns.of(p.x), self.row_of(p)]
+    }
+
+    /// Row of a point.
+    #[inline]
+    pub(super) fn row_of(&self, p: DVec3) -> u32 {
+        self.rows.of(p.y)
+    }
+}
+
+/// Counts the whole steps from a first place to others: `(x - first) / step`, cut off, and held within 0 and the last.
+#[derive(Clone, Copy)]
+pub(super) struct Steps {
+    first: f64,
+    step: f64,
+    per_unit: f64,
+    last: u32,
+}
+
+/// A product with the reciprocal is nearer to the quotient than this, as long as both are below 2^27.
+const QUOTIENT_MARGIN: f64 = 1e-6;
+
+impl Steps {
+    /// `count` steps, at most 2^27.
+    pub(super) fn new(first: f64, step: f64, count: u32) -> Steps {
+        Steps { first, step, per_unit: 1.0 / step, last: count - 1 }
+    }
+
+    #[inline]
+    pub(super) fn of(&self, x: f64) -> u32 {
+        let length = x - self.first;
+        // Dividing takes long, and is asked only where the product is so near a whole number that it could tell.
+        let product = length * self.per_unit;
+        let whole = product as u32;
+        let part = product - f64::from(whole);
+        let sure = part > QUOTIENT_MARGIN && part < 1.0 - QUOTIENT_MARGIN;
+        // The conversion cuts off towards 0, and gives 0 below it.
+        let steps = if sure { whole } else { (length / self.step) as u32 };
+        steps.min(self.last)
     }
 }
 
@@ -184,5 +239,27 @@ impl CellStarts {
             let last = grid.number([block.columns.end - 1, row]);
             self.0[first]..self.0[last + 1]
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_are_those_of_a_division() {
+        for (first, step, count) in [(0.0, 0.1, 1000), (-3.7, 1e-4, 1 << 26), (12.25, 7.3, 3), (0.1, 0.3, 1 << 20)] {
+            let steps = Steps::new(first, step, count);
+            let divided = |x: f64| (((x - first) / step).floor().max(0.0) as u32).min(count - 1);
+            let mut near = vec![first - 1e9, first - step, first, first + 1e9, f64::MAX];
+            for k in (0..2000).map(|i| i * i * 17 + i).chain([f64::from(count) as i64, i64::from(count) - 1]) {
+                let at = first + k as f64 * step;
+                let (below, above) = (at.next_down(), at.next_up());
+                near.extend([below.next_down(), below, at, above, above.next_up(), at + 0.37 * step]);
+            }
+            for x in near {
+                assert_eq!(steps.of(x), divided(x), "{x:e} from {first} by {step}");
+            }
+        }
     }
 }

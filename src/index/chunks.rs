@@ -7,13 +7,15 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Elements of a chunk: enough to hide its cost, few enough to share out.
 const CHUNK: u64 = 1 << 15;
+/// Elements that are read at a time: they stay in the processor's cache.
+const PIECE: u64 = 1 << 11;
 /// Chunks between two releases of the survey's pages: some tens of megabytes.
 const RELEASE: u64 = 32;
 
 /// Hands 0..`n` to `work` in chunks. Every thread makes its own state with `start`.
 ///
 /// Chunks come in no particular order, so `work` must not care. What was read of the surface is let go as
-/// the pass goes on.
+/// the pass goes on, but for what the next pass may read first.
 pub(super) fn over_chunks<S>(
     surface: &dyn Surface,
     n: u64,
@@ -45,6 +47,10 @@ pub(super) fn over_chunks_then<S>(
             }
         }
     });
-    surface.release();
     done.into_iter().collect()
+}
+
+/// Cuts what a thread works into pieces that are read at a time.
+pub(super) fn pieces(range: Range<u64>) -> impl Iterator<Item = Range<u64>> {
+    range.clone().step_by(PIECE as usize).map(move |first| first..(first + PIECE).min(range.end))
 }

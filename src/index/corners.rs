@@ -3,7 +3,7 @@
 //! The new numbers of a block of the input's vertices are held in memory, and all triangles pass by. Where
 //! one block does not hold all vertices, the triangles pass once for each block, through a scratch column.
 
-use super::chunks::{over_chunks, over_chunks_then};
+use super::chunks::{over_chunks, over_chunks_then, pieces};
 use super::identity::{Id, Numbers};
 use super::shards::{Shard, holding};
 use crate::open::Surface;
@@ -24,8 +24,11 @@ struct Block {
     high: Vec<AtomicU32>,
 }
 
+/// Vertices of a block, at least.
+const LEAST_VERTICES: u64 = 1 << 12;
+
 /// Bytes of a block for each vertex.
-pub(super) fn block_bytes(vertices: u64) -> u64 {
+fn block_bytes(vertices: u64) -> u64 {
     if vertices > u64::from(u32::MAX) { 8 } else { 4 }
 }
 
@@ -38,15 +41,17 @@ impl Block {
         let block = Block { input, low: zeros(len), high: zeros(if wide { len } else { 0 }) };
         (0..inputs.len().div_ceil(PIECE)).into_par_iter().try_for_each(|piece| {
             let mut number = piece * PIECE;
-            inputs.each(number..(number + PIECE).min(inputs.len()), |[input]| {
-                if block.input.contains(&input) {
-                    let at = (input - block.input.start) as usize;
-                    block.low[at].store(number as u32, Ordering::Relaxed);
-                    if let Some(high) = block.high.get(at) {
-                        high.store((number >> 32) as u32, Ordering::Relaxed);
+            inputs.each_slice(number..(number + PIECE).min(inputs.len()), |inputs| {
+                for &[input] in inputs {
+                    let at = input.wrapping_sub(block.input.start);
+                    if at < block.low.len() as u64 {
+                        block.low[at as usize].store(number as u32, Ordering::Relaxed);
+                        if let Some(high) = block.high.get(at as usize) {
+                            high.store((number >> 32) as u32, Ordering::Relaxed);
+                        }
                     }
+                    number += 1;
                 }
-                number += 1;
             })
         })?;
         Ok(block)
@@ -54,13 +59,22 @@ impl Block {
 
     #[inline]
     fn resolve(&self, corner: u64) -> u64 {
-        if corner & KNOWN != 0 || !self.input.contains(&corner) {
+        // A corner that has its new number lies above all blocks, by its mark.
+        let at = corner.wrapping_sub(self.input.start);
+        if at >= self.low.len() as u64 {
             return corner;
         }
-        let at = (corner - self.input.start) as usize;
-        let high = self.high.get(at).map_or(0, |high| u64::from(high.load(Ordering::Relaxed)) << 32);
-        KNOWN | high | u64::from(self.low[at].load(Ordering::Relaxed))
+        let high = self.high.get(at as usize).map_or(0, |high| u64::from(high.load(Ordering::Relaxed)) << 32);
+        KNOWN | high | u64::from(self.low[at as usize].load(Ordering::Relaxed))
     }
+}
+
+/// Memory for the join, bytes: for the new numbers that are held at once, and for triangles that wait for their
+/// shard.
+#[derive(Clone, Copy)]
+pub(super) struct JoinRoom {
+    pub(super) block: u64,
+    pub(super) waiting: u64,
 }
 
 /// Scatters the triangles to the shards of their lowest corners: the triangle's place in the input, then
@@ -70,54 +84,55 @@ pub(super) fn scatter<I: Id>(
     inputs: &Numbers<1>,
     shards: &[Shard],
     shelf: &Shelf,
-    block_vertices: u64,
+    room: JoinRoom,
 ) -> Result<Scatter<[I; 4]>, StoreError> {
-    let scatter = Scatter::<[I; 4]>::new(shelf, "triangles", shards.len())?;
+    let scatter = Scatter::<[I; 4]>::new(shelf, "triangles", shards.len(), room.waiting)?;
+    let block_vertices = (room.block / block_bytes(inputs.len())).max(LEAST_VERTICES);
     let blocks = surface.vertices().div_ceil(block_vertices).max(1);
     let passing =
         if blocks > 1 { Some(shelf.create::<[u64; 3]>("corners.scratch", surface.triangles())?) } else { None };
     for k in 0..blocks {
         let input = k * block_vertices..((k + 1) * block_vertices).min(surface.vertices());
         let block = Block::read(inputs, input)?;
-        let corners = |range: Range<u64>, take: &mut dyn FnMut(u64, [u64; 3]) -> Result<(), StoreError>| {
-            let mut known = Vec::new();
-            match &passing {
-                Some(column) if k > 0 => column.read(range.clone(), &mut known)?,
-                _ => known.extend(range.clone().map(|t| surface.triangle(t))),
+        let read = |range: Range<u64>, corners: &mut Vec<[u64; 3]>| match &passing {
+            Some(column) if k > 0 => {
+                corners.clear();
+                column.read(range, corners)
             }
-            range.zip(known).try_for_each(|(t, corners)| take(t, corners.map(|c| block.resolve(c))))
+            _ => {
+                surface.corner_numbers(range, corners);
+                Ok(())
+            }
         };
         match &passing {
-            Some(column) if k + 1 < blocks => {
-                over_chunks(
-                    surface,
-                    surface.triangles(),
-                    || Ok(()),
-                    |(), range| {
-                        let (first, mut known) = (range.start, Vec::new());
-                        corners(range, &mut |_, corners| {
-                            known.push(corners);
-                            Ok(())
-                        })?;
-                        column.write(first, known)
-                    },
-                )?;
-            }
+            Some(column) if k + 1 < blocks => over_chunks(
+                surface,
+                surface.triangles(),
+                || Ok(Vec::new()),
+                |corners, range| {
+                    read(range.clone(), corners)?;
+                    column.write(range.start, corners.iter().map(|corners| corners.map(|c| block.resolve(c))))
+                },
+            )?,
             _ => over_chunks_then(
                 surface,
                 surface.triangles(),
-                || Ok(scatter.writer()),
-                |writer, range| {
+                || Ok((scatter.writer(), Vec::new())),
+                |(writer, corners), range| {
                     let mut last = 0;
-                    corners(range, &mut |t, corners| {
-                        let [a, b, c] = lowest_first(corners.map(|c| c & !KNOWN));
-                        if !shards[last].vertices.contains(&a) {
-                            last = holding(shards, a);
+                    for piece in pieces(range) {
+                        read(piece.clone(), corners)?;
+                        for (t, &corners) in piece.zip(&*corners) {
+                            let [a, b, c] = lowest_first(corners.map(|c| block.resolve(c) & !KNOWN));
+                            if !shards[last].vertices.contains(&a) {
+                                last = holding(shards, a);
+                            }
+                            writer.put(last, [I::of(t), I::of(a), I::of(b), I::of(c)])?;
                         }
-                        writer.put(last, [I::of(t), I::of(a), I::of(b), I::of(c)])
-                    })
+                    }
+                    Ok(())
                 },
-                |writer| writer.finish(),
+                |(writer, _)| writer.finish(),
             )?,
         }
     }

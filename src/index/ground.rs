@@ -2,8 +2,8 @@
 //!
 //! Only what triangles use counts: a stray vertex far away must not stretch the grid.
 
-use super::cells::CellGrid;
-use super::chunks::over_chunks;
+use super::cells::{CellGrid, Steps};
+use super::chunks::{over_chunks, over_chunks_then, pieces};
 use crate::geometry::DVec3;
 use crate::open::Surface;
 use crate::store::StoreError;
@@ -64,54 +64,75 @@ pub(super) fn look(surface: &dyn Surface) -> Result<Ground, StoreError> {
     over_chunks(
         surface,
         surface.triangles(),
-        || Ok(()),
-        |(), range| {
-            range.for_each(|t| surface.triangle(t).into_iter().for_each(|v| used.set(v)));
+        || Ok(Vec::new()),
+        |corners, range| {
+            for piece in pieces(range) {
+                surface.corner_numbers(piece, corners);
+                corners.iter().flatten().for_each(|&v| used.set(v));
+            }
             Ok(())
         },
     )?;
     let vertices = used.count();
-    let (min, max) = bounds(surface, &used)?;
+    let (min, max) = match surface.bounds() {
+        Some(of_all) if vertices == surface.vertices() => of_all,
+        _ => bounds(surface, &used)?,
+    };
     let area_m2 = area_in_plan(surface, &used, vertices, (min, max))?;
     let triangles = surface.triangles();
     let grid = CellGrid::over(min, max, triangles, area_m2 / triangles.max(1) as f64, TRIANGLES_PER_CELL);
-    let in_row: Vec<AtomicU64> = (0..grid.rows).map(|_| AtomicU64::new(0)).collect();
-    each_used(surface, &used, |p| {
-        in_row[grid.cell_of(p)[1] as usize].fetch_add(1, Ordering::Relaxed);
-    })?;
-    let in_row = in_row.into_iter().map(AtomicU64::into_inner).collect();
+    let in_row = in_rows(surface, &used, &grid)?;
     Ok(Ground { used, vertices, min, max, grid, in_row })
 }
 
-fn each_used(surface: &dyn Surface, used: &Bits, look: impl Fn(DVec3) + Sync) -> Result<(), StoreError> {
-    over_chunks(
+/// Looks at every vertex that is used. What threads have seen is `merged` in no particular order.
+fn each_used<S: Clone + Sync + Send>(
+    surface: &dyn Surface,
+    used: &Bits,
+    nothing: S,
+    look: impl Fn(&mut S, DVec3) + Sync,
+    merge: impl Fn(&mut S, S) + Sync,
+) -> Result<S, StoreError> {
+    let whole = Mutex::new(nothing.clone());
+    over_chunks_then(
         surface,
         surface.vertices(),
-        || Ok(()),
-        |(), range| {
-            range.filter(|&v| used.get(v)).for_each(|v| look(surface.position(v)));
+        || Ok((nothing.clone(), Vec::new())),
+        |(seen, positions), range| {
+            for piece in pieces(range) {
+                surface.positions(piece.clone(), positions);
+                piece.zip(&*positions).filter(|&(v, _)| used.get(v)).for_each(|(_, &p)| look(seen, p));
+            }
             Ok(())
         },
-    )
-}
-
-fn bounds(surface: &dyn Surface, used: &Bits) -> Result<(DVec3, DVec3), StoreError> {
-    let whole = Mutex::new((DVec3::INFINITY, DVec3::NEG_INFINITY));
-    over_chunks(
-        surface,
-        surface.vertices(),
-        || Ok(()),
-        |(), range| {
-            let (min, max) = range
-                .filter(|&v| used.get(v))
-                .map(|v| surface.position(v))
-                .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), p| (min.min(p), max.max(p)));
-            let mut whole = whole.lock().unwrap_or_else(PoisonError::into_inner);
-            *whole = (whole.0.min(min), whole.1.max(max));
+        |(seen, _)| {
+            merge(&mut whole.lock().unwrap_or_else(PoisonError::into_inner), seen);
             Ok(())
         },
     )?;
     Ok(whole.into_inner().unwrap_or_else(PoisonError::into_inner))
+}
+
+fn bounds(surface: &dyn Surface, used: &Bits) -> Result<(DVec3, DVec3), StoreError> {
+    each_used(
+        surface,
+        used,
+        (DVec3::INFINITY, DVec3::NEG_INFINITY),
+        |(min, max), p| (*min, *max) = (min.min(p), max.max(p)),
+        |(min, max), of_thread| (*min, *max) = (min.min(of_thread.0), max.max(of_thread.1)),
+    )
+}
+
+/// Vertices in each row of cells.
+fn in_rows(surface: &dyn Surface, used: &Bits, grid: &CellGrid) -> Result<Vec<u64>, StoreError> {
+    let finder = grid.finder();
+    each_used(
+        surface,
+        used,
+        vec![0; grid.rows as usize],
+        |in_row, p| in_row[finder.row_of(p) as usize] += 1,
+        |in_row, of_thread| in_row.iter_mut().zip(of_thread).for_each(|(all, n)| *all += n),
+    )
 }
 
 /// Area of the squares that hold a vertex, m². A winding reach fills little of its box.
@@ -124,12 +145,13 @@ fn area_in_plan(
     let squares = ((vertices / VERTICES_PER_SQUARE) as f64).clamp(1.0, MOST_SQUARES);
     let (width, height) = ((max.x - min.x).max(1e-9), (max.y - min.y).max(1e-9));
     let side = (width * height / squares).sqrt().max(width.max(height) / squares);
-    let columns = (width / side).floor() as u64 + 1;
-    let rows = (height / side).floor() as u64 + 1;
-    let occupied = Bits::new(columns * rows);
-    each_used(surface, used, |p| {
-        let place = |x: f64, min: f64, n: u64| (((x - min) / side) as u64).min(n - 1);
-        occupied.set(place(p.y, min.y, rows) * columns + place(p.x, min.x, columns));
-    })?;
+    let columns = (width / side).floor() as u32 + 1;
+    let rows = (height / side).floor() as u32 + 1;
+    let occupied = Bits::new(u64::from(columns) * u64::from(rows));
+    let (east, north) = (Steps::new(min.x, side, columns), Steps::new(min.y, side, rows));
+    let look = |(): &mut (), p: DVec3| {
+        occupied.set(u64::from(north.of(p.y)) * u64::from(columns) + u64::from(east.of(p.x)));
+    };
+    each_used(surface, used, (), look, |(), ()| ())?;
     Ok((occupied.count() as f64 * side * side).min(width * height))
 }

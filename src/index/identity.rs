@@ -1,6 +1,6 @@
 //! Numbers of vertices and triangles, as narrow as the survey allows.
 
-use crate::store::{Column, Element, Shelf, StoreError};
+use crate::store::{Column, ColumnWriter, Element, Shelf, StoreError};
 use std::ops::Range;
 
 /// A number of a vertex or triangle: 32 bits where all of a survey fit, else 64.
@@ -50,17 +50,18 @@ impl<const N: usize> Numbers<N> {
         Ok(if wide { Numbers::Wide(shelf.open(name, len)?) } else { Numbers::Narrow(shelf.open(name, len)?) })
     }
 
-    pub(super) fn each(&self, range: Range<u64>, mut take: impl FnMut([u64; N])) -> Result<(), StoreError> {
+    /// Hands the numbers of a range to `take`, in order, some at a time.
+    pub(super) fn each_slice(&self, range: Range<u64>, take: impl FnMut(&[[u64; N]])) -> Result<(), StoreError> {
         match self {
-            Numbers::Narrow(column) => column.each(range, |numbers| take(numbers.map(u64::from))),
-            Numbers::Wide(column) => column.each(range, take),
+            Numbers::Narrow(column) => column.each_slice(range, |numbers| numbers.map(u64::from), take),
+            Numbers::Wide(column) => column.each_slice(range, |numbers| numbers, take),
         }
     }
 
-    pub(super) fn write(&self, first: u64, numbers: impl Iterator<Item = [u64; N]>) -> Result<(), StoreError> {
+    pub(super) fn writer(&self, first: u64) -> NumbersWriter<'_, N> {
         match self {
-            Numbers::Narrow(column) => column.write(first, numbers.map(|n| n.map(u32::of))),
-            Numbers::Wide(column) => column.write(first, numbers),
+            Numbers::Narrow(column) => NumbersWriter::Narrow(column.writer(first)),
+            Numbers::Wide(column) => NumbersWriter::Wide(column.writer(first)),
         }
     }
 
@@ -75,10 +76,10 @@ impl<const N: usize> Numbers<N> {
         matches!(self, Numbers::Wide(_))
     }
 
-    pub(super) fn checksum(&self) -> Result<u64, StoreError> {
+    pub(super) fn checksum(&self, range: Range<u64>) -> Result<u64, StoreError> {
         match self {
-            Numbers::Narrow(column) => column.checksum(),
-            Numbers::Wide(column) => column.checksum(),
+            Numbers::Narrow(column) => column.checksum(range),
+            Numbers::Wide(column) => column.checksum(range),
         }
     }
 
@@ -86,6 +87,29 @@ impl<const N: usize> Numbers<N> {
         match self {
             Numbers::Narrow(column) => column.sync(),
             Numbers::Wide(column) => column.sync(),
+        }
+    }
+}
+
+/// Writes numbers one behind the other.
+pub(super) enum NumbersWriter<'a, const N: usize> {
+    Narrow(ColumnWriter<'a, [u32; N]>),
+    Wide(ColumnWriter<'a, [u64; N]>),
+}
+
+impl<const N: usize> NumbersWriter<'_, N> {
+    #[inline(always)]
+    pub(super) fn put(&mut self, numbers: [u64; N]) -> Result<(), StoreError> {
+        match self {
+            NumbersWriter::Narrow(writer) => writer.put(numbers.map(u32::of)),
+            NumbersWriter::Wide(writer) => writer.put(numbers),
+        }
+    }
+
+    pub(super) fn finish(self) -> Result<u64, StoreError> {
+        match self {
+            NumbersWriter::Narrow(writer) => writer.finish(),
+            NumbersWriter::Wide(writer) => writer.finish(),
         }
     }
 }

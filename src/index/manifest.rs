@@ -1,7 +1,9 @@
 //! The manifest of an index: what a later run needs to use it again.
 
 use super::cells::{CellGrid, CellStarts};
+use super::colors::Colors;
 use super::identity::Numbers;
+use super::seal::Seal;
 use super::{COLORS, CORNERS, Columns, Index, POSITIONS, Scale, TRIANGLE_INPUTS, VALENCES, VERTEX_INPUTS};
 use crate::store::{Column, Shelf, StoreError, fail_point};
 use serde::{Deserialize, Serialize};
@@ -14,7 +16,7 @@ const VERTEX_STARTS: &str = "vertex_starts";
 const TRIANGLE_STARTS: &str = "triangle_starts";
 
 /// Must change when the meaning of a column does.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 
 #[derive(Serialize, Deserialize)]
 struct Manifest {
@@ -24,8 +26,10 @@ struct Manifest {
     scale: Scale,
     wide: bool,
     full_color: Option<f64>,
-    /// Of the columns, in the order of [`Index::checksums`].
-    checksums: Vec<u64>,
+    /// XXH3-64 of the first triangle and the first vertex of each cell.
+    starts: [u64; 2],
+    /// Of the columns.
+    seals: Vec<Seal>,
 }
 
 impl Index {
@@ -46,7 +50,7 @@ impl Index {
         columns.corners.sync()?;
         columns.vertex_inputs.sync()?;
         columns.triangle_inputs.sync()?;
-        if let Some((_, colors)) = &columns.colors {
+        if let Some(colors) = &columns.colors {
             colors.sync()?;
         }
         let manifest = Manifest {
@@ -55,8 +59,9 @@ impl Index {
             grid: self.grid.clone(),
             scale: self.scale,
             wide: columns.corners.is_wide(),
-            full_color: columns.colors.as_ref().map(|(full, _)| *full),
-            checksums: self.checksums()?,
+            full_color: columns.colors.as_ref().map(Colors::full),
+            starts: self.starts_checksums(),
+            seals: self.seals.clone(),
         };
         // Plain numbers and a text can always be put into bytes.
         let bytes = postcard::to_extend(&manifest, Vec::new()).unwrap_or_default();
@@ -91,32 +96,23 @@ impl Index {
                 vertex_inputs: Numbers::open(shelf, VERTEX_INPUTS, scale.vertices, wide).ok()?,
                 triangle_inputs: Numbers::open(shelf, TRIANGLE_INPUTS, scale.triangles, wide).ok()?,
                 colors: match manifest.full_color {
-                    Some(full) => Some((full, shelf.open(COLORS, scale.vertices).ok()?)),
+                    Some(full) => Some(Colors::open(shelf, COLORS, scale.vertices, full).ok()?),
                     None => None,
                 },
             },
+            seals: manifest.seals,
         };
-        (index.checksums().ok()? == manifest.checksums).then_some(index)
+        let whole = index.starts_checksums() == manifest.starts
+            && index.seals.iter().all(|seal| seal.fits(&index.columns).unwrap_or(false));
+        whole.then_some(index)
     }
 
-    fn checksums(&self) -> Result<Vec<u64>, StoreError> {
-        let columns = &self.columns;
-        let mut found = vec![
-            columns.positions.checksum()?,
-            columns.valences.checksum()?,
-            columns.corners.checksum()?,
-            columns.vertex_inputs.checksum()?,
-            columns.triangle_inputs.checksum()?,
-        ];
-        if let Some((_, colors)) = &columns.colors {
-            found.push(colors.checksum()?);
-        }
-        for cells in [&self.triangles, &self.vertices] {
+    fn starts_checksums(&self) -> [u64; 2] {
+        [&self.triangles, &self.vertices].map(|cells| {
             let mut hash = XxHash3_64::new();
             cells.starts().iter().for_each(|start| hash.write(&start.to_le_bytes()));
-            found.push(hash.finish());
-        }
-        Ok(found)
+            hash.finish()
+        })
     }
 
     /// Whether a folder holds an index that was kept, of whatever survey.

@@ -10,26 +10,31 @@
 //! ```
 //!
 //! Memory does not grow with the survey but for a bit for each vertex and 16 bytes for each cell (of about 64
-//! triangles). On disk it takes about 45 bytes for each triangle.
+//! triangles). On disk it takes about 35 bytes for each triangle.
 
 mod cells;
 mod chunks;
+mod colors;
 mod corners;
 mod ground;
 mod identity;
 mod manifest;
+mod order;
 mod scale;
+mod seal;
 mod shards;
 mod triangles;
 mod vertices;
 
 pub use cells::{CellBlock, CellGrid, CellStarts};
+pub use colors::Colors;
 pub use scale::Scale;
 
 use crate::geometry::{DVec3, ExactSum};
 use crate::open::Surface;
-use crate::store::{Column, Shelf, StoreError};
+use crate::store::{Column, Element, Shelf, StoreError};
 use identity::Numbers;
+use seal::Seal;
 use std::ops::Range;
 
 /// A survey that cannot be indexed.
@@ -61,17 +66,30 @@ pub struct Index {
     /// Survey-wide figures. `spacing_m` is 0 until it has been measured.
     pub scale: Scale,
     columns: Columns,
+    seals: Vec<Seal>,
+}
+
+impl Element for DVec3 {
+    const BYTES: usize = 24;
+    #[inline(always)]
+    fn put(self, to: &mut [u8]) {
+        self.to_array().put(to);
+    }
+    #[inline(always)]
+    fn get(from: &[u8]) -> DVec3 {
+        DVec3::from_array(Element::get(from))
+    }
 }
 
 /// What the index keeps on disk.
 #[derive(Debug)]
 struct Columns {
-    positions: Column<[f64; 3]>,
+    positions: Column<DVec3>,
     valences: Column<u16>,
     corners: Numbers<3>,
     vertex_inputs: Numbers<1>,
     triangle_inputs: Numbers<1>,
-    colors: Option<(f64, Column<[f32; 3]>)>,
+    colors: Option<Colors>,
 }
 
 const POSITIONS: &str = "positions";
@@ -117,38 +135,43 @@ impl Index {
             vertex_inputs: Numbers::create(shelf, VERTEX_INPUTS, ground.vertices, wide)?,
             triangle_inputs: Numbers::create(shelf, TRIANGLE_INPUTS, surface.triangles(), wide)?,
             colors: match surface.full_color() {
-                Some(full) => Some((full, shelf.create(COLORS, ground.vertices)?)),
+                Some(full) => Some(Colors::create(shelf, COLORS, ground.vertices, full)?),
                 None => None,
             },
         };
-        let to = vertices::Sorted {
-            positions: &columns.positions,
-            inputs: &columns.vertex_inputs,
-            colors: columns.colors.as_ref().map(|(_, column)| column),
+        let work = Work { surface, ground: &ground, shards: &shards, shelf, columns: &columns, room };
+        let bytes = columns.colors.as_ref().is_none_or(|colors| Colors::are_bytes(colors.full()));
+        let (vertices, triangles) = match (wide, bytes) {
+            (false, true) => work.sort::<u32, [u8; 3]>()?,
+            (false, false) => work.sort::<u32, [f32; 3]>()?,
+            (true, true) => work.sort::<u64, [u8; 3]>()?,
+            (true, false) => work.sort::<u64, [f32; 3]>()?,
         };
-        let vertices = CellStarts::new(vertices::sort(surface, &ground, &shards, shelf, &to)?);
-        let (triangles, sums) = if wide {
-            sort_triangles::<u64>(surface, &ground, &shards, shelf, &columns, room)?
-        } else {
-            sort_triangles::<u32>(surface, &ground, &shards, shelf, &columns, room)?
-        };
-        let scale = sums.scale(&ground, surface.triangles());
+        surface.release();
+        let scale = triangles.sums.scale(&ground, surface.triangles());
         if scale.mean_triangle_area_m2 <= 0.0 {
             return Err(IndexError::NoArea { triangles: scale.triangles });
         }
-        Ok(Index { grid: ground.grid, triangles: CellStarts::new(triangles), vertices, scale, columns })
+        Ok(Index {
+            grid: ground.grid,
+            triangles: CellStarts::new(triangles.start),
+            vertices: CellStarts::new(vertices.start),
+            scale,
+            columns,
+            seals: seal::of_shards(&shards, &vertices.checksums, triangles.written),
+        })
     }
 
-    /// Hands the corners of a range of triangles to `take`, in order.
+    /// Hands the corners of a range of triangles to `take`, in order, some at a time.
     ///
     /// # Errors
     /// The disk says no.
-    pub fn each_corners(&self, triangles: Range<u64>, take: impl FnMut([u64; 3])) -> Result<(), StoreError> {
-        self.columns.corners.each(triangles, take)
+    pub fn each_corners(&self, triangles: Range<u64>, take: impl FnMut(&[[u64; 3]])) -> Result<(), StoreError> {
+        self.columns.corners.each_slice(triangles, take)
     }
 
     /// Positions of vertices, local metres.
-    pub fn positions(&self) -> &Column<[f64; 3]> {
+    pub fn positions(&self) -> &Column<DVec3> {
         &self.columns.positions
     }
 
@@ -158,9 +181,9 @@ impl Index {
         &self.columns.valences
     }
 
-    /// Colours of vertices as the input has them, red, green, blue, and what stands for full colour.
-    pub fn colors(&self) -> Option<(f64, &Column<[f32; 3]>)> {
-        self.columns.colors.as_ref().map(|(full, column)| (*full, column))
+    /// Colours of vertices as the input has them, if it has any.
+    pub fn colors(&self) -> Option<&Colors> {
+        self.columns.colors.as_ref()
     }
 
     /// The input's numbers of a range of triangles.
@@ -169,7 +192,7 @@ impl Index {
     /// The disk says no.
     pub fn triangle_inputs(&self, triangles: Range<u64>) -> Result<Vec<u64>, StoreError> {
         let mut found = Vec::with_capacity((triangles.end - triangles.start) as usize);
-        self.columns.triangle_inputs.each(triangles, |[input]| found.push(input))?;
+        self.columns.triangle_inputs.each_slice(triangles, |inputs| found.extend_from_slice(inputs.as_flattened()))?;
         Ok(found)
     }
 
@@ -179,49 +202,73 @@ impl Index {
     /// The disk says no.
     pub fn vertex_inputs(&self, vertices: Range<u64>) -> Result<Vec<u64>, StoreError> {
         let mut found = Vec::with_capacity((vertices.end - vertices.start) as usize);
-        self.columns.vertex_inputs.each(vertices, |[input]| found.push(input))?;
+        self.columns.vertex_inputs.each_slice(vertices, |inputs| found.extend_from_slice(inputs.as_flattened()))?;
         Ok(found)
     }
 }
 
-fn sort_triangles<I: identity::Id>(
-    surface: &dyn Surface,
-    ground: &ground::Ground,
-    shards: &[shards::Shard],
-    shelf: &Shelf,
-    columns: &Columns,
+/// What is sorted, and where to.
+struct Work<'a> {
+    surface: &'a dyn Surface,
+    ground: &'a ground::Ground,
+    shards: &'a [shards::Shard],
+    shelf: &'a Shelf,
+    columns: &'a Columns,
     room: BuildRoom,
-) -> Result<(Vec<u64>, Sums), StoreError> {
-    let block = room.bytes / 4 / corners::block_bytes(ground.vertices);
-    let scatter = corners::scatter::<I>(surface, &columns.vertex_inputs, shards, shelf, block.max(LEAST_VERTICES))?;
-    let to = triangles::Sorted {
-        positions: &columns.positions,
-        corners: &columns.corners,
-        inputs: &columns.triangle_inputs,
-        valences: &columns.valences,
-    };
-    triangles::sort::<I>(&scatter, &ground.grid, shards, &to)
 }
 
-/// Bytes that an index takes on disk, with the scratch files of its making and the divergence of every vertex.
-pub fn disk_bytes(vertices: u64, triangles: u64, has_colors: bool) -> u64 {
+impl Work<'_> {
+    fn sort<I: identity::Id, C: colors::Color>(
+        &self,
+    ) -> Result<(vertices::SortedVertices, triangles::SortedTriangles), StoreError> {
+        let Work { surface, ground, shards, shelf, columns, room } = *self;
+        // Half is for the shards that are sorted: see `shard_vertices`.
+        let quarter = room.bytes / 4;
+        let to = vertices::Sorted {
+            positions: &columns.positions,
+            inputs: &columns.vertex_inputs,
+            colors: columns.colors.as_ref(),
+        };
+        let vertices = vertices::sort::<I, C>(surface, ground, shards, (shelf, quarter), &to)?;
+        let join = corners::JoinRoom { block: quarter, waiting: quarter };
+        let scatter = corners::scatter::<I>(surface, &columns.vertex_inputs, shards, shelf, join)?;
+        let to = triangles::Sorted {
+            positions: &columns.positions,
+            corners: &columns.corners,
+            inputs: &columns.triangle_inputs,
+            valences: &columns.valences,
+        };
+        Ok((vertices, triangles::sort::<I>(&scatter, &ground.grid, shards, &to)?))
+    }
+}
+
+/// Bytes that an index takes on disk, with the scratch files of its making, if none of them fits into memory, and the
+/// divergence of every vertex.
+pub fn disk_bytes(vertices: u64, triangles: u64, full_color: Option<f64>) -> u64 {
     let wide = vertices.max(triangles) > u64::from(u32::MAX);
     let number = if wide { 8 } else { 4 };
-    let colors = if has_colors { 12 } else { 0 };
-    let scratch = (vertices * 48).max(triangles * 4 * number);
+    let bytes = full_color.is_none_or(Colors::are_bytes);
+    let waiting = 28 + number + if bytes { 3 } else { 12 };
+    let colors = if full_color.is_none() { 0 } else { waiting - 28 - number };
+    let scratch = (vertices * waiting).max(triangles * 4 * number);
     vertices * (24 + 2 + 8 + number + colors) + triangles * 4 * number + scratch
 }
 
-/// Vertices of a shard or of a block, at least.
+/// Vertices of a shard, at least.
 const LEAST_VERTICES: u64 = 1 << 12;
+/// Vertices of a shard that the processor's cache holds, with their triangles.
+const CACHED_VERTICES: u64 = 1 << 15;
+/// More shards than this would leave the disk with pieces that are too small.
+const MOST_CACHED_SHARDS: u64 = 256;
 
 /// Vertices of a shard: what half of the memory holds, shared by the threads; fewer where that gives each
-/// thread several to choose from.
+/// thread several to choose from, or where the processor's cache then holds a shard.
 fn shard_vertices(vertices: u64, room: BuildRoom) -> u64 {
     let threads = rayon::current_num_threads() as u64;
     let width = if room.wide { 2 } else { 1 };
     let each = vertices::SORTING_BYTES.max(2 * width * triangles::SORTING_BYTES);
-    (room.bytes / 2 / threads / each).min(vertices / (4 * threads)).max(LEAST_VERTICES)
+    let cached = CACHED_VERTICES.max(vertices / MOST_CACHED_SHARDS);
+    (room.bytes / 2 / threads / each).min(vertices / (4 * threads)).min(cached).max(LEAST_VERTICES)
 }
 
 /// Sums over all triangles, and what they give.
@@ -235,6 +282,7 @@ struct Sums {
 impl Sums {
     const NOTHING: Sums = Sums { area: ExactSum::ZERO, edges: ExactSum::ZERO, zero_area: 0 };
 
+    #[inline(always)]
     fn add(&mut self, c: [DVec3; 3], area_m2: f64) {
         self.area.add(area_m2);
         self.zero_area += u64::from(area_m2 == 0.0);

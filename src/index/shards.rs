@@ -47,22 +47,33 @@ pub(super) fn holding(shards: &[Shard], vertex: u64) -> usize {
     shards.partition_point(|s| s.vertices.end <= vertex)
 }
 
-/// Places of the elements after sorting them by cell: `order[i]` is the element that comes `i`-th, and the
-/// first place of each cell, with the end behind the last. Within a cell the order is that of the elements.
-pub(super) fn by_cell(cells: usize, cell_of: &[u32]) -> (Vec<u32>, Vec<u32>) {
-    let mut start = vec![0u32; cells + 1];
-    for &cell in cell_of {
-        start[cell as usize + 1] += 1;
+/// For each row of cells its shard.
+pub(super) fn of_rows(shards: &[Shard]) -> Vec<u32> {
+    (0..).zip(shards).flat_map(|(i, shard)| shard.rows.clone().map(move |_| i)).collect()
+}
+
+/// Elements put behind one another by cell, and the first of each cell, with the end behind the last. `parts` gives
+/// the elements with their cells, twice alike; within a cell their order stays.
+pub(super) fn by_cell<T: Copy + Default, P: Iterator<Item = (u32, T)>>(
+    cells: usize,
+    parts: impl Fn() -> P,
+) -> (Vec<T>, Vec<u32>) {
+    // One place further on than where they belong: putting the elements moves them back.
+    let mut start = vec![0u32; cells + 2];
+    let mut n = 0;
+    parts().for_each(|(cell, _)| {
+        start[cell as usize + 2] += 1;
+        n += 1;
+    });
+    for cell in 2..cells + 2 {
+        start[cell] += start[cell - 1];
     }
-    for i in 0..cells {
-        start[i + 1] += start[i];
-    }
-    let mut next = start.clone();
-    let mut order = vec![0u32; cell_of.len()];
-    for (i, &cell) in (0u32..).zip(cell_of) {
-        let slot = &mut next[cell as usize];
-        order[*slot as usize] = i;
-        *slot += 1;
-    }
-    (order, start)
+    let mut placed = vec![T::default(); n];
+    parts().for_each(|(cell, element)| {
+        let place = &mut start[cell as usize + 1];
+        placed[*place as usize] = element;
+        *place += 1;
+    });
+    start.truncate(cells + 1);
+    (placed, start)
 }

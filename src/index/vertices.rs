@@ -1,129 +1,147 @@
 //! Vertices are sorted into cells, and by position within.
 
-use super::chunks::over_chunks_then;
+use super::chunks::{over_chunks_then, pieces};
+use super::colors::{Color, Colors};
 use super::ground::Ground;
-use super::identity::Numbers;
-use super::shards::{Shard, by_cell};
+use super::identity::{Id, Numbers};
+use super::order::Sorter;
+use super::shards::{Shard, by_cell, of_rows};
 use crate::geometry::DVec3;
 use crate::open::Surface;
 use crate::store::{Column, Element, Scatter, Shelf, StoreError};
 use rayon::prelude::*;
+use std::cmp::Ordering;
 
 /// A vertex on its way to its shard.
-#[derive(Clone, Copy)]
-struct Record {
+#[derive(Clone, Copy, Default)]
+struct Record<I, C> {
     cell: u32,
-    color: [f32; 3],
-    input: u64,
-    position: [f64; 3],
+    input: I,
+    color: C,
+    position: DVec3,
 }
 
-impl Element for Record {
-    const BYTES: usize = 48;
+impl<I: Id, C: Color> Element for Record<I, C> {
+    const BYTES: usize = 28 + I::BYTES + C::BYTES;
     #[inline(always)]
     fn put(self, to: &mut [u8]) {
         self.cell.put(&mut to[..4]);
-        self.color.put(&mut to[4..16]);
-        self.input.put(&mut to[16..24]);
-        self.position.put(&mut to[24..48]);
+        self.position.put(&mut to[4..28]);
+        self.input.put(&mut to[28..28 + I::BYTES]);
+        self.color.put(&mut to[28 + I::BYTES..]);
     }
     #[inline(always)]
     fn get(from: &[u8]) -> Self {
         Record {
             cell: u32::get(&from[..4]),
-            color: Element::get(&from[4..16]),
-            input: u64::get(&from[16..24]),
-            position: Element::get(&from[24..48]),
+            position: DVec3::get(&from[4..28]),
+            input: I::get(&from[28..28 + I::BYTES]),
+            color: C::get(&from[28 + I::BYTES..]),
         }
     }
 }
 
-/// Memory for each vertex of a shard while it is sorted, bytes.
-pub(super) const SORTING_BYTES: u64 = Record::BYTES as u64 + 24 + 16;
+/// Memory for each vertex of a shard while it is sorted, bytes: its record twice, and the starts of cells.
+pub(super) const SORTING_BYTES: u64 = 2 * size_of::<Record<u64, [f32; 3]>>() as u64 + 16;
 
 /// Where the sorted vertices go.
 pub(super) struct Sorted<'a> {
-    pub(super) positions: &'a Column<[f64; 3]>,
+    pub(super) positions: &'a Column<DVec3>,
     pub(super) inputs: &'a Numbers<1>,
-    pub(super) colors: Option<&'a Column<[f32; 3]>>,
+    pub(super) colors: Option<&'a Colors>,
 }
 
-/// Sorts the vertices that triangles use into the columns, and returns the first vertex of each cell, with
-/// the end behind the last.
+/// What the vertices of a survey became.
+pub(super) struct SortedVertices {
+    /// The first vertex of each cell, with the end behind the last.
+    pub(super) start: Vec<u64>,
+    /// Checksums of what each shard wrote: positions, inputs, colours.
+    pub(super) checksums: Vec<[u64; 3]>,
+}
+
+/// Sorts the vertices that triangles use into the columns.
 ///
 /// Vertices get their numbers by cell, row by row from the south-west, then by x, y, z, then by their place
-/// in the input: what is the same surface gets the same numbers, in whatever order its file is.
-pub(super) fn sort(
+/// in the input: what is the same surface gets the same numbers, in whatever order its file is. About
+/// `room` bytes of what waits for its shard stay in memory.
+pub(super) fn sort<I: Id, C: Color>(
     surface: &dyn Surface,
     ground: &Ground,
     shards: &[Shard],
-    shelf: &Shelf,
+    (shelf, room): (&Shelf, u64),
     to: &Sorted,
-) -> Result<Vec<u64>, StoreError> {
-    let scatter = Scatter::<Record>::new(shelf, "vertices", shards.len())?;
-    let grid = &ground.grid;
+) -> Result<SortedVertices, StoreError> {
+    let scatter = Scatter::<Record<I, C>>::new(shelf, "vertices", shards.len(), room)?;
+    let (grid, finder) = (&ground.grid, ground.grid.finder());
+    let of_rows = of_rows(shards);
     over_chunks_then(
         surface,
         surface.vertices(),
-        || Ok(scatter.writer()),
-        |writer, range| {
-            for input in range.filter(|&v| ground.used.get(v)) {
-                let p = surface.position(input);
-                let [column, row] = grid.cell_of(p);
-                let shard = shards.partition_point(|s| s.rows.end <= row);
-                let cell = grid.number([column, row - shards[shard].rows.start]) as u32;
-                let color = surface.raw_color(input);
-                writer.put(shard, Record { cell, color, input, position: p.to_array() })?;
+        || Ok((scatter.writer(), Vec::new(), Vec::new())),
+        |(writer, positions, colors), range| {
+            for piece in pieces(range) {
+                surface.positions(piece.clone(), positions);
+                surface.raw_colors(piece.clone(), colors);
+                for (input, (&p, &color)) in piece.zip(positions.iter().zip(&*colors)) {
+                    if ground.used.get(input) {
+                        let [column, row] = finder.cell_of(p);
+                        let shard = of_rows[row as usize] as usize;
+                        let cell = grid.number([column, row - shards[shard].rows.start]) as u32;
+                        let (input, color) = (I::of(input), C::of(color));
+                        writer.put(shard, Record { cell, input, color, position: p })?;
+                    }
+                }
             }
             Ok(())
         },
-        |writer| writer.finish(),
+        |(writer, ..)| writer.finish(),
     )?;
-    let starts = (0..shards.len())
+    let sorted = (0..shards.len())
         .into_par_iter()
         .with_max_len(1)
-        .map(|i| sort_shard(&scatter, i, &shards[i], grid.columns as usize, to))
+        .map(|i| sort_shard(scatter.take(i)?, &shards[i], grid.columns as usize, to))
         .collect::<Result<Vec<_>, _>>()?;
     let mut start = Vec::with_capacity(grid.len() + 1);
-    for (shard, of_shard) in shards.iter().zip(starts) {
+    let mut checksums = Vec::with_capacity(shards.len());
+    for (shard, (of_shard, sums)) in shards.iter().zip(sorted) {
         let cells = of_shard.len() - 1;
         start.extend(of_shard[..cells].iter().map(|&s| shard.vertices.start + u64::from(s)));
+        checksums.push(sums);
     }
     start.push(ground.vertices);
-    Ok(start)
+    Ok(SortedVertices { start, checksums })
 }
 
-fn sort_shard(
-    scatter: &Scatter<Record>,
-    bucket: usize,
+fn sort_shard<I: Id, C: Color>(
+    blocks: Vec<Vec<Record<I, C>>>,
     shard: &Shard,
     columns: usize,
     to: &Sorted,
-) -> Result<Vec<u32>, StoreError> {
-    let records = scatter.read(bucket)?;
-    let cell_of: Vec<u32> = records.iter().map(|r| r.cell).collect();
-    let (mut order, start) = by_cell(shard.rows.len() * columns, &cell_of);
-    let mut keyed: Vec<(u64, u32)> = Vec::new();
+) -> Result<(Vec<u32>, [u64; 3]), StoreError> {
+    let (records, start) = by_cell(shard.rows.len() * columns, || blocks.iter().flatten().map(|r| (r.cell, *r)));
+    drop(blocks);
+    let first = shard.vertices.start;
+    let (mut positions, mut inputs) = (to.positions.writer(first), to.inputs.writer(first));
+    let mut colors = to.colors.map(|colors| colors.writer(first));
+    let mut sorter = Sorter::default();
     for cell in start.windows(2) {
-        let order = &mut order[cell[0] as usize..cell[1] as usize];
-        keyed.clear();
-        keyed.extend(order.iter().map(|&i| (ascending(records[i as usize].position[0]), i)));
-        keyed.sort_unstable_by(|a, b| {
-            a.0.cmp(&b.0).then_with(|| {
-                let (a, b) = (&records[a.1 as usize], &records[b.1 as usize]);
-                let key = |r: &Record| [ascending(r.position[1]), ascending(r.position[2]), r.input];
-                key(a).cmp(&key(b))
-            })
-        });
-        order.iter_mut().zip(&keyed).for_each(|(place, key)| *place = key.1);
+        let records = &records[cell[0] as usize..cell[1] as usize];
+        // Coordinates are finite, so that one is the lower or both are the same place.
+        let exact = |a: &Record<I, C>, b: &Record<I, C>| {
+            let (p, q) = (a.position, b.position);
+            let order = (p.x, p.y, p.z, a.input).partial_cmp(&(q.x, q.y, q.z, b.input));
+            order.unwrap_or(Ordering::Equal)
+        };
+        for i in sorter.places(records, |r| ascending(r.position.x), exact) {
+            positions.put(records[i].position)?;
+            inputs.put([records[i].input.number()])?;
+            if let Some(colors) = &mut colors {
+                colors.put(records[i].color)?;
+            }
+        }
     }
-    let sorted = || order.iter().map(|&i| &records[i as usize]);
-    to.positions.write(shard.vertices.start, sorted().map(|r| r.position))?;
-    to.inputs.write(shard.vertices.start, sorted().map(|r| [r.input]))?;
-    if let Some(colors) = to.colors {
-        colors.write(shard.vertices.start, sorted().map(|r| r.color))?;
-    }
-    Ok(start)
+    let colors = colors.map_or(Ok(0), |colors| colors.finish())?;
+    Ok((start, [positions.finish()?, inputs.finish()?, colors]))
 }
 
 /// Bits that sort as the finite numbers do.
@@ -131,11 +149,4 @@ fn ascending(x: f64) -> u64 {
     // -0.0 and 0.0 are one place.
     let bits = (x + 0.0).to_bits();
     if bits >> 63 == 1 { !bits } else { bits | 1 << 63 }
-}
-
-/// Reads positions as points.
-pub(super) fn points(column: &Column<[f64; 3]>, range: std::ops::Range<u64>) -> Result<Vec<DVec3>, StoreError> {
-    let mut found = Vec::with_capacity((range.end - range.start) as usize);
-    column.each(range, |p| found.push(DVec3::from_array(p)))?;
-    Ok(found)
 }

@@ -9,6 +9,7 @@ use super::progress::Progress;
 use super::records::{CHUNK, Source, Walk};
 use super::scalar::Scalar;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Names under which the corners are written.
 const CORNER_NAMES: [&str; 2] = ["vertex_indices", "vertex_index"];
@@ -86,16 +87,33 @@ impl Faces {
             }
         };
         let (first, size) = (list + self.length.size(), self.index.size());
-        if matches!(self.index, Scalar::I32 | Scalar::U32) {
-            // Nearly every mesh: three plain reads.
-            let read = |corner: usize| {
-                let at = first + corner * 4;
-                u64::from(u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]))
-            };
-            return [read(0), read(k + 1), read(k + 2)];
+        if self.has_plain_index() {
+            return [0, k + 1, k + 2].map(|corner| plain_index(&bytes[first + corner * 4..]));
         }
         // Validated to lie in 0..vertices, so the sign is gone.
         [0, k + 1, k + 2].map(|corner| self.index.integer(&bytes[first + corner * size..]) as u64)
+    }
+
+    /// Hands the corners of a range of triangles to `take`, vertex numbers of this file.
+    #[inline]
+    pub(super) fn each_triangle(&self, bytes: &[u8], triangles: Range<u64>, mut take: impl FnMut([u64; 3])) {
+        match self.shape {
+            Shape::Fixed { first_list, stride } if self.has_plain_index() => {
+                let first = (first_list + triangles.start * stride) as usize + self.length.size();
+                for i in 0..triangles.end.saturating_sub(triangles.start) {
+                    let at = first + (i * stride) as usize;
+                    let list = &bytes[at..at + 12];
+                    take([0, 4, 8].map(|i| plain_index(&list[i..])));
+                }
+            }
+            _ => triangles.for_each(|t| take(self.triangle(bytes, t))),
+        }
+    }
+
+    /// Whether corners are of 32 bits, as in nearly every mesh. Validated ones have no sign.
+    #[inline]
+    fn has_plain_index(&self) -> bool {
+        matches!(self.index, Scalar::I32 | Scalar::U32)
     }
 
     /// The face that a triangle is part of.
@@ -114,6 +132,11 @@ impl Faces {
         let (first, index) = (list + self.length.size(), self.index);
         (0..entries).map(move |corner| index.integer(&bytes[first + corner * index.size()..]) as u64)
     }
+}
+
+#[inline]
+fn plain_index(bytes: &[u8]) -> u64 {
+    u64::from(u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]))
 }
 
 fn find_corners(path: &str, element: &Element) -> Result<Corners, OpenError> {
@@ -173,10 +196,19 @@ fn read_fixed(
         let index_at = |corner: usize| index.integer(&list[corner * index.size()..]);
         (0..3).map(index_at).find(|&i| i < 0 || i as u64 >= vertices).map(|i| (face, Flaw::Index(i)))
     };
+    // In nearly every mesh nothing need be asked of each number but whether it is small enough.
+    let plain = length.size() == 1 && faces.has_plain_index();
+    let limit = vertices.min(if index == Scalar::I32 { 1 << 31 } else { 1 << 32 });
+    let is_plain = |face: u64| {
+        let list = (first_list + face * stride) as usize;
+        let list = &source.bytes[list..list + 13];
+        let below = |i: usize| plain_index(&list[i..]) < limit;
+        (list[0] == 3) & below(1) & below(5) & below(9)
+    };
     // The first flaw in file order decides: behind a polygon, fixed strides read nonsense.
     let flaw = (0..element.count.div_ceil(CHUNK)).into_par_iter().find_map_first(|chunk| {
         let (first, last) = (chunk * CHUNK, ((chunk + 1) * CHUNK).min(element.count));
-        let flaw = (first..last).find_map(look);
+        let flaw = if plain && (first..last).all(is_plain) { None } else { (first..last).find_map(look) };
         source.passed(progress, (last - first) * stride);
         flaw
     });

@@ -80,6 +80,13 @@ impl MappedFile {
         let _ = unsafe { self.map.unchecked_advise(UncheckedAdvice::DontNeed) };
     }
 
+    /// Lets go of the pages where all of them together are more than may be kept.
+    pub(super) fn release_if_large(&self) {
+        if self.map.len() as u64 > KEPT_BYTES {
+            self.release();
+        }
+    }
+
     /// Time of the last change, seconds since 1970; 0 where the file system does not tell.
     pub(super) fn modified_s(&self) -> i64 {
         self.modified_s

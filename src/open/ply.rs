@@ -79,6 +79,11 @@ impl PlyMesh {
         self.bytes.release();
     }
 
+    /// Lets go of the file's pages, if they are more than may be kept.
+    pub(super) fn release_if_large(&self) {
+        self.bytes.release_if_large();
+    }
+
     /// Time of the file's last change, seconds since 1970.
     pub(super) fn modified_s(&self) -> i64 {
         self.bytes.modified_s()

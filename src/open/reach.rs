@@ -12,6 +12,7 @@ use super::survey_file::SurveyFile;
 use super::warning::Warning;
 use crate::geometry::DVec3;
 use crate::settings::{InputSettings, Unit};
+use std::ops::Range;
 use std::path::PathBuf;
 
 /// A survey that is ready to be computed on: every vertex is finite, every triangle names vertices that
@@ -62,8 +63,9 @@ impl Reach {
         let has_colors = files.iter().all(|f| f.color_type().is_some());
         let full_color = has_colors.then_some(if bytes { 255.0 } else { 1.0 });
         let reach = Reach { files, frame, bounds, full_color };
-        reach.check_precision()?;
-        let warnings = reach.warnings(input);
+        let edges_m: Vec<_> = reach.files.iter().map(|file| reach.sampled_edge_m(file)).collect();
+        reach.check_precision(&edges_m)?;
+        let warnings = reach.warnings(input, &edges_m);
         Ok((reach, warnings))
     }
 
@@ -123,6 +125,48 @@ impl Reach {
         [a + file.first_vertex, b + file.first_vertex, c + file.first_vertex]
     }
 
+    /// Puts the places of a range of vertices, local metres, in place of what `to` holds: quicker than one by one.
+    ///
+    /// # Panics
+    /// Above the last vertex.
+    pub fn positions(&self, vertices: Range<u64>, to: &mut Vec<DVec3>) {
+        to.clear();
+        for file in &self.files {
+            let of_file = within(&vertices, file.first_vertex, file.vertices());
+            file.mesh.vertices.each_position(file.mesh.bytes(), of_file, |p| to.push(self.frame.local(p)));
+        }
+    }
+
+    /// Puts the colours of a range of vertices, as [`Reach::raw_color`] has them, in place of what `to` holds.
+    ///
+    /// # Panics
+    /// Above the last vertex.
+    pub fn raw_colors(&self, vertices: Range<u64>, to: &mut Vec<[f32; 3]>) {
+        to.clear();
+        match self.full_color {
+            None => to.resize(vertices.end.saturating_sub(vertices.start) as usize, [0.0; 3]),
+            Some(full) => {
+                for file in &self.files {
+                    let (bytes, of_file) = (file.mesh.bytes(), within(&vertices, file.first_vertex, file.vertices()));
+                    to.extend(of_file.map(|v| file.mesh.vertices.color_in(bytes, v, full).unwrap_or_default()));
+                }
+            }
+        }
+    }
+
+    /// Puts the vertices of a range of triangles in place of what `to` holds: quicker than one by one.
+    ///
+    /// # Panics
+    /// Above the last triangle.
+    pub fn corner_numbers(&self, triangles: Range<u64>, to: &mut Vec<[u64; 3]>) {
+        to.clear();
+        for file in &self.files {
+            let of_file = within(&triangles, file.first_triangle, file.triangles());
+            let first = file.first_vertex;
+            file.mesh.faces.each_triangle(file.mesh.bytes(), of_file, |corners| to.push(corners.map(|v| v + first)));
+        }
+    }
+
     /// The face that a triangle is part of.
     ///
     /// # Panics
@@ -156,9 +200,9 @@ impl Reach {
     /// Above the last vertex.
     #[inline]
     pub fn raw_color(&self, vertex: u64) -> [f32; 3] {
-        let (Some(full), Some(color)) = (self.full_color, self.color(vertex)) else { return [0.0; 3] };
-        // Whole numbers again where they were: 255 times a 255th rounds to one.
-        color.map(|c| (c * full) as f32)
+        let Some(full) = self.full_color else { return [0.0; 3] };
+        let file = self.file_of(vertex, |f| f.first_vertex);
+        file.mesh.vertices.color_in(file.mesh.bytes(), vertex - file.first_vertex, full).unwrap_or_default()
     }
 
     /// Lets go of all pages of the files: they are read again when they are needed.
@@ -191,15 +235,16 @@ impl Reach {
                 }
             }
             // Corners may lie anywhere in the file, and every page that is touched brings its neighbours.
-            self.release();
+            file.mesh.release_if_large();
         }
+        file.mesh.release();
         (edges > 0).then(|| sum / f64::from(edges))
     }
 
-    fn check_precision(&self) -> Result<(), OpenError> {
-        for file in &self.files {
+    fn check_precision(&self, edges_m: &[Option<f64>]) -> Result<(), OpenError> {
+        for (file, &edge_m) in self.files.iter().zip(edges_m) {
             let step = coarsest_step(file.axis_types(), file.input_bounds());
-            if let (Some((step, largest)), Some(edge_m)) = (step, self.sampled_edge_m(file)) {
+            if let (Some((step, largest)), Some(edge_m)) = (step, edge_m) {
                 let step_m = step * self.frame.metres_per_input_unit;
                 if step_m > COARSEST_STEP_IN_EDGES * edge_m {
                     let path = file.path.display().to_string();
@@ -210,15 +255,14 @@ impl Reach {
         Ok(())
     }
 
-    fn warnings(&self, input: &InputSettings) -> Vec<Warning> {
+    fn warnings(&self, input: &InputSettings, edges_m: &[Option<f64>]) -> Vec<Warning> {
         let mut warnings = Vec::new();
         let name = |file: &SurveyFile| file.path.display().to_string();
         if let [first, _, ..] = self.files.as_slice() {
             warnings.push(Warning::SeparateFiles { path: name(first), files: self.files.len() });
         }
-        if let Some(first) = self.files.first()
+        if let (Some(first), Some(&Some(mean_edge_m))) = (self.files.first(), edges_m.first())
             && input.unit == Unit::Auto
-            && let Some(mean_edge_m) = self.sampled_edge_m(first)
         {
             let extent_m = self.plan_extent_m();
             if LIKE_MILLIMETRES_M.iter().any(|&(edge, extent)| mean_edge_m >= edge && extent_m > extent) {
@@ -247,6 +291,11 @@ impl Reach {
         let (min, max) = self.bounds;
         (max[0] - min[0]).max(max[1] - min[1]) * self.frame.metres_per_input_unit
     }
+}
+
+/// What of a range lies in a file with `n` elements from `first` on, by the file's own numbers.
+fn within(range: &Range<u64>, first: u64, n: u64) -> Range<u64> {
+    range.start.saturating_sub(first).min(n)..range.end.saturating_sub(first).min(n)
 }
 
 fn open_files(paths: &[PathBuf], tell: &(dyn Fn(u64, u64) + Sync)) -> Result<Vec<SurveyFile>, OpenError> {

@@ -2,6 +2,7 @@
 
 use super::Reach;
 use crate::geometry::DVec3;
+use std::ops::Range;
 
 /// A triangulated surface: vertices and triangles by global number, in the order of the input.
 ///
@@ -14,15 +15,36 @@ pub trait Surface: Sync {
     fn triangles(&self) -> u64;
     /// Position of a vertex, local metres.
     fn position(&self, vertex: u64) -> DVec3;
+    /// Lowest and highest corner of the box of all vertices, local metres, where it is known.
+    fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        None
+    }
     /// The three vertices of a triangle, counter-clockwise seen from outside.
     fn triangle(&self, triangle: u64) -> [u64; 3];
-    /// What stands for full colour in [`Surface::raw_color`], if the survey has colours.
+    /// What stands for full colour in [`Surface::raw_color`], if the survey has colours. Where it is 255, colours are
+    /// whole numbers of one byte.
     fn full_color(&self) -> Option<f64>;
     /// Colour of a vertex as the input has it: red, green, blue. Zero without colours.
     fn raw_color(&self, vertex: u64) -> [f32; 3];
     /// Lets go of what was read and is not needed soon: a pass over a survey larger than memory says so from
     /// time to time. Reading goes on as before.
     fn release(&self) {}
+
+    /// Puts the positions of a range of vertices in place of what `to` holds.
+    fn positions(&self, vertices: Range<u64>, to: &mut Vec<DVec3>) {
+        to.clear();
+        to.extend(vertices.map(|v| self.position(v)));
+    }
+    /// Puts the colours of a range of vertices in place of what `to` holds.
+    fn raw_colors(&self, vertices: Range<u64>, to: &mut Vec<[f32; 3]>) {
+        to.clear();
+        to.extend(vertices.map(|v| self.raw_color(v)));
+    }
+    /// Puts the vertices of a range of triangles in place of what `to` holds.
+    fn corner_numbers(&self, triangles: Range<u64>, to: &mut Vec<[u64; 3]>) {
+        to.clear();
+        to.extend(triangles.map(|t| self.triangle(t)));
+    }
 
     /// The three corners of a triangle, local metres.
     fn corners(&self, triangle: u64) -> [DVec3; 3] {
@@ -40,6 +62,11 @@ impl Surface for Reach {
     fn position(&self, vertex: u64) -> DVec3 {
         self.position(vertex)
     }
+    fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        // Subtraction and multiplication round without changing which is lower.
+        let (min, max) = self.input_bounds();
+        Some((self.frame().local(min), self.frame().local(max)))
+    }
     fn triangle(&self, triangle: u64) -> [u64; 3] {
         self.triangle(triangle)
     }
@@ -48,6 +75,15 @@ impl Surface for Reach {
     }
     fn raw_color(&self, vertex: u64) -> [f32; 3] {
         self.raw_color(vertex)
+    }
+    fn positions(&self, vertices: Range<u64>, to: &mut Vec<DVec3>) {
+        self.positions(vertices, to);
+    }
+    fn raw_colors(&self, vertices: Range<u64>, to: &mut Vec<[f32; 3]>) {
+        self.raw_colors(vertices, to);
+    }
+    fn corner_numbers(&self, triangles: Range<u64>, to: &mut Vec<[u64; 3]>) {
+        self.corner_numbers(triangles, to);
     }
     fn release(&self) {
         self.release();

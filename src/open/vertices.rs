@@ -6,6 +6,7 @@ use super::progress::Progress;
 use super::records::{CHUNK, Records, Source, locate};
 use super::scalar::Scalar;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Names under which colours are written.
 const COLOR_NAMES: [[&str; 3]; 3] =
@@ -134,7 +135,9 @@ impl Vertices {
             .into_par_iter()
             .map(|chunk| {
                 let (first, last) = (chunk * CHUNK, ((chunk + 1) * CHUNK).min(self.count));
-                let bounds = (first..last).fold(VertexBounds::EMPTY, |b, v| self.look(source.bytes, b, v));
+                let bounds = self.plain_bounds(source.bytes, first..last);
+                let bounds = bounds
+                    .unwrap_or_else(|| (first..last).fold(VertexBounds::EMPTY, |b, v| self.look(source.bytes, b, v)));
                 source.passed(progress, (self.records.at(last - 1) - self.records.at(first)) as u64);
                 bounds
             })
@@ -148,6 +151,22 @@ impl Vertices {
             self.color_refused = Some(format!("vertex {vertex} has a float colour outside 0 to 1"));
         }
         Ok((bounds.min, bounds.max))
+    }
+
+    /// Bounds of vertices of which nothing else need be told; none if something must.
+    fn plain_bounds(&self, bytes: &[u8], vertices: Range<u64>) -> Option<VertexBounds> {
+        if self.color.is_some_and(|c| !c.scalar.is_integer()) {
+            return None;
+        }
+        let (mut bounds, mut finite) = (VertexBounds::EMPTY, true);
+        self.each_position(bytes, vertices, |p| {
+            for (axis, &value) in p.iter().enumerate() {
+                bounds.min[axis] = bounds.min[axis].min(value);
+                bounds.max[axis] = bounds.max[axis].max(value);
+                finite &= value.is_finite();
+            }
+        });
+        finite.then_some(bounds)
     }
 
     #[inline]
@@ -187,6 +206,23 @@ impl Vertices {
         }
     }
 
+    /// Hands x, y, z of a range of vertices to `take`, input units.
+    #[inline]
+    pub(super) fn each_position(&self, bytes: &[u8], vertices: Range<u64>, mut take: impl FnMut([f64; 3])) {
+        match (&self.records, self.place) {
+            // Nearly every mesh: plain reads, one stride apart.
+            (Records::Fixed { stride, .. }, Place::Floats(at)) if !vertices.is_empty() => {
+                let first = self.records.at(vertices.start) + at;
+                for i in 0..vertices.end - vertices.start {
+                    let place = first + (i * stride) as usize;
+                    let place = &bytes[place..place + 12];
+                    take([0, 4, 8].map(|i| Scalar::F32.number(&place[i..])));
+                }
+            }
+            _ => vertices.for_each(|v| take(self.position(bytes, v))),
+        }
+    }
+
     /// Type of the colours, if they are read.
     pub(super) fn color_type(&self) -> Option<Scalar> {
         self.color.map(|c| c.scalar)
@@ -198,6 +234,18 @@ impl Vertices {
         let color = self.color?;
         let record = &bytes[self.records.at(vertex)..];
         Some(color.offsets.map(|at| color.scalar.number(&record[at..]) / color.full))
+    }
+
+    /// Red, green and blue of a vertex, 0 to `full`. Bytes that are to be of 255 parts stay what they are: 255 times a
+    /// 255th rounds to one.
+    #[inline]
+    pub(super) fn color_in(&self, bytes: &[u8], vertex: u64, full: f64) -> Option<[f32; 3]> {
+        let color = self.color?;
+        let record = &bytes[self.records.at(vertex)..];
+        if color.scalar == Scalar::U8 && full == color.full {
+            return Some(color.offsets.map(|at| f32::from(record[at])));
+        }
+        Some(color.offsets.map(|at| (color.scalar.number(&record[at..]) / color.full * full) as f32))
     }
 
     /// The bytes of a vertex's numbers, as [`Vertices::scalars`] lists them.

@@ -2,7 +2,7 @@
 
 use super::again::clusters;
 use super::{Survey, TileError};
-use crate::index::CellBlock;
+use crate::index::{CellBlock, Colors};
 use crate::measure::{Grain, Wanted, measure};
 use crate::pipeline::{Crew, LostJob, Reservation, Stages, Stopped, over_jobs};
 use crate::progress::{Progress, Unit};
@@ -10,7 +10,7 @@ use crate::segment::{OversizePiece, Settled, segment};
 use crate::settings::SegmentSettings;
 use crate::stitch::{TileFinding, TileReport};
 use crate::store::{Column, StoreError, panic_point};
-use crate::tile::{Owned, TileMesh, each_of};
+use crate::tile::{Owned, TileMesh, read_of};
 use rayon::prelude::*;
 
 /// What the grain pass applies to every tile.
@@ -185,8 +185,7 @@ impl Survey<'_> {
         recipe: &Recipe,
     ) -> Result<(TileMesh, Settled), TileError> {
         let mesh = TileMesh::load(self.index, owned, block)?;
-        let mut divergence = Vec::with_capacity(mesh.positions.len());
-        each_of(recipe.divergence, &mesh.vertex_runs, |d| divergence.push(d))?;
+        let divergence = read_of(recipe.divergence, &mesh.vertex_runs)?;
         let settled = segment(&mesh, &divergence, &self.index.scale, recipe.settings, &mut |_, _| {});
         Ok((mesh, settled))
     }
@@ -194,10 +193,14 @@ impl Survey<'_> {
     /// Colours of a tile's vertices, and what stands for full colour.
     #[allow(clippy::type_complexity, reason = "used once, and named where it is used")]
     fn colors(&self, mesh: &TileMesh) -> Result<Option<(f64, Vec<[f32; 3]>)>, StoreError> {
-        let Some((full, column)) = self.index.colors() else { return Ok(None) };
-        let mut colors = Vec::with_capacity(mesh.positions.len());
-        each_of(column, &mesh.vertex_runs, |c| colors.push(c))?;
-        Ok(Some((full, colors)))
+        let Some(kept) = self.index.colors() else { return Ok(None) };
+        let colors = match kept {
+            Colors::Bytes(column) => {
+                read_of(column, &mesh.vertex_runs)?.into_iter().map(|c| c.map(f32::from)).collect()
+            }
+            Colors::Floats(_, column) => read_of(column, &mesh.vertex_runs)?,
+        };
+        Ok(Some((kept.full(), colors)))
     }
 
     /// Puts the input's numbers, ascending, in place of the survey's: labels go back onto the input.

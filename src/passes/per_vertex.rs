@@ -106,7 +106,7 @@ impl Survey<'_> {
         let runs = index.vertices.ranges(&index.grid, core);
         let mut points = Vec::with_capacity(index.vertices.count(&index.grid, core) as usize);
         for run in &runs {
-            index.positions().each(run.clone(), |p| points.push(DVec3::from_array(p)))?;
+            index.positions().read(run.clone(), &mut points)?;
         }
         let field = load(index, &self.with_halo(core, halo_m))?;
         let mut loaded = field.centroids.len() as u64;

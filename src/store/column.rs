@@ -5,6 +5,7 @@
 
 use super::StoreError;
 use super::positioned::Positioned;
+use std::cell::RefCell;
 use std::fs::OpenOptions;
 use std::hash::Hasher;
 use std::marker::PhantomData;
@@ -62,7 +63,35 @@ impl<T: Element, const N: usize> Element for [T; N] {
 }
 
 /// Elements converted at a time: their bytes stay in the processor's cache.
-const PIECE_BYTES: usize = 1 << 18;
+const PIECE_BYTES: usize = 1 << 17;
+
+/// Elements that are handed over at a time.
+const SLICE: usize = 1 << 10;
+
+thread_local! {
+    /// Pieces of [`PIECE_BYTES`] that are not in use. Columns are read in many short runs, and fresh memory costs
+    /// more than reading them.
+    static PIECES: RefCell<Vec<Vec<u8>>> = const { RefCell::new(Vec::new()) };
+}
+
+/// [`PIECE_BYTES`] of whatever was there before; goes back when it is dropped.
+#[derive(Debug)]
+struct Piece(Vec<u8>);
+
+impl Piece {
+    fn new() -> Piece {
+        let used = PIECES.with_borrow_mut(Vec::pop);
+        Piece(used.unwrap_or_else(|| vec![0; PIECE_BYTES]))
+    }
+}
+
+impl Drop for Piece {
+    fn drop(&mut self) {
+        let bytes = std::mem::take(&mut self.0);
+        // While a thread ends there is nothing left to go back to.
+        let _ = PIECES.try_with(|pieces| pieces.borrow_mut().push(bytes));
+    }
+}
 
 /// A file of elements.
 #[derive(Debug)]
@@ -110,24 +139,25 @@ impl<T: Element> Column<T> {
         self.len == 0
     }
 
-    /// Hands the elements of a range to `take`, in order.
+    /// Hands the elements of a range, converted, to `take`, in order, some at a time.
     ///
     /// # Errors
     /// The file cannot be read.
-    pub fn each(&self, range: Range<u64>, mut take: impl FnMut(T)) -> Result<(), StoreError> {
-        let step = (PIECE_BYTES / T::BYTES) as u64;
-        let mut bytes = vec![0; PIECE_BYTES.min((range.end.saturating_sub(range.start)) as usize * T::BYTES)];
-        let mut at = range.start;
-        while at < range.end {
-            let n = step.min(range.end - at);
-            let part = &mut bytes[..n as usize * T::BYTES];
-            self.file
-                .read_exact_at(part, at * T::BYTES as u64)
-                .map_err(|e| StoreError::io(&self.path, "read the column", e))?;
-            part.chunks_exact(T::BYTES).for_each(|element| take(T::get(element)));
-            at += n;
-        }
-        Ok(())
+    pub fn each_slice<U>(
+        &self,
+        range: Range<u64>,
+        convert: impl Fn(T) -> U,
+        mut take: impl FnMut(&[U]),
+    ) -> Result<(), StoreError> {
+        let n = range.end.saturating_sub(range.start) as usize;
+        let mut slice = Vec::with_capacity(n.min(SLICE));
+        self.each_piece(range, |bytes| {
+            for some in bytes.chunks(SLICE * T::BYTES) {
+                slice.clear();
+                slice.extend(some.chunks_exact(T::BYTES).map(|element| convert(T::get(element))));
+                take(&slice);
+            }
+        })
     }
 
     /// Appends the elements of a range.
@@ -136,7 +166,25 @@ impl<T: Element> Column<T> {
     /// The file cannot be read.
     pub fn read(&self, range: Range<u64>, to: &mut Vec<T>) -> Result<(), StoreError> {
         to.reserve(range.end.saturating_sub(range.start) as usize);
-        self.each(range, |element| to.push(element))
+        self.each_piece(range, |bytes| to.extend(bytes.chunks_exact(T::BYTES).map(T::get)))
+    }
+
+    fn each_piece(&self, range: Range<u64>, mut take: impl FnMut(&[u8])) -> Result<(), StoreError> {
+        let step = (PIECE_BYTES / T::BYTES) as u64;
+        let mut piece = Piece::new();
+        let mut at = range.start;
+        while at < range.end {
+            let n = step.min(range.end - at);
+            let part = &mut piece.0[..n as usize * T::BYTES];
+            self.read_bytes(part, at * T::BYTES as u64)?;
+            take(part);
+            at += n;
+        }
+        Ok(())
+    }
+
+    fn read_bytes(&self, bytes: &mut [u8], at: u64) -> Result<(), StoreError> {
+        self.file.read_exact_at(bytes, at).map_err(|e| StoreError::io(&self.path, "read the column", e))
     }
 
     /// Writes elements from number `first` on.
@@ -144,31 +192,32 @@ impl<T: Element> Column<T> {
     /// # Errors
     /// The file cannot be written, as on a full disk.
     pub fn write(&self, first: u64, elements: impl IntoIterator<Item = T>) -> Result<(), StoreError> {
-        let mut bytes = vec![0; PIECE_BYTES / T::BYTES * T::BYTES];
-        let (mut at, mut filled) = (first * T::BYTES as u64, 0);
-        let write = |part: &[u8], at| self.file.write_all_at(part, at).map_err(|e| self.unwritten(e));
-        for element in elements {
-            element.put(&mut bytes[filled..filled + T::BYTES]);
-            filled += T::BYTES;
-            if filled == bytes.len() {
-                write(&bytes, at)?;
-                (at, filled) = (at + filled as u64, 0);
-            }
-        }
-        write(&bytes[..filled], at)
+        let mut writer = self.writer(first);
+        elements.into_iter().try_for_each(|element| writer.put(element))?;
+        writer.finish().map(|_| ())
     }
 
-    /// XXH3-64 of all its bytes.
+    /// A writer of elements from number `first` on.
+    pub fn writer(&self, first: u64) -> ColumnWriter<'_, T> {
+        ColumnWriter {
+            column: self,
+            piece: Piece::new(),
+            filled: 0,
+            at: first * T::BYTES as u64,
+            hash: XxHash3_64::new(),
+        }
+    }
+
+    /// XXH3-64 of the bytes of a range, which must be within the column.
     ///
     /// # Errors
     /// The file cannot be read.
-    pub fn checksum(&self) -> Result<u64, StoreError> {
-        let (mut hash, mut at) = (XxHash3_64::new(), 0);
-        let end = self.len * T::BYTES as u64;
-        let mut bytes = vec![0; PIECE_BYTES.min(end as usize)];
+    pub fn checksum(&self, range: Range<u64>) -> Result<u64, StoreError> {
+        let (mut hash, mut at, end) = (XxHash3_64::new(), range.start * T::BYTES as u64, range.end * T::BYTES as u64);
+        let mut piece = Piece::new();
         while at < end {
-            let part = &mut bytes[..(end - at).min(PIECE_BYTES as u64) as usize];
-            self.file.read_exact_at(part, at).map_err(|e| StoreError::io(&self.path, "read the column", e))?;
+            let part = &mut piece.0[..(end - at).min(PIECE_BYTES as u64) as usize];
+            self.read_bytes(part, at)?;
             hash.write(part);
             at += part.len() as u64;
         }
@@ -185,6 +234,48 @@ impl<T: Element> Column<T> {
 
     fn unwritten(&self, source: std::io::Error) -> StoreError {
         StoreError::io(&self.path, "write the column", source)
+    }
+}
+
+/// Writes elements one behind the other.
+pub struct ColumnWriter<'a, T> {
+    column: &'a Column<T>,
+    piece: Piece,
+    filled: usize,
+    at: u64,
+    hash: XxHash3_64,
+}
+
+impl<T: Element> ColumnWriter<'_, T> {
+    /// Puts the next element.
+    ///
+    /// # Errors
+    /// The file cannot be written, as on a full disk.
+    #[inline]
+    pub fn put(&mut self, element: T) -> Result<(), StoreError> {
+        if self.filled + T::BYTES > PIECE_BYTES {
+            self.write()?;
+        }
+        element.put(&mut self.piece.0[self.filled..self.filled + T::BYTES]);
+        self.filled += T::BYTES;
+        Ok(())
+    }
+
+    /// Writes what is left, and returns the XXH3-64 of all that was put.
+    ///
+    /// # Errors
+    /// The file cannot be written, as on a full disk.
+    pub fn finish(mut self) -> Result<u64, StoreError> {
+        self.write()?;
+        Ok(self.hash.finish())
+    }
+
+    fn write(&mut self) -> Result<(), StoreError> {
+        let (column, bytes) = (self.column, &self.piece.0[..self.filled]);
+        self.hash.write(bytes);
+        column.file.write_all_at(bytes, self.at).map_err(|e| column.unwritten(e))?;
+        (self.at, self.filled) = (self.at + self.filled as u64, 0);
+        Ok(())
     }
 }
 
@@ -208,6 +299,19 @@ mod tests {
         assert_eq!(found[..5], [[0.0; 3]; 5]);
         assert!(found[5..].iter().zip(10..).all(|(&f, i)| f == element(i)));
         assert!(column.read(99_999..100_001, &mut found).is_err());
+    }
+
+    #[test]
+    fn a_writer_knows_the_checksum_of_what_is_read_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let column = Column::<[u32; 3]>::create(&folder.path().join("column"), 90_000).unwrap();
+        let mut writer = column.writer(5);
+        (0..80_000).for_each(|i| writer.put([i, i * i, 7]).unwrap());
+        let checksum = writer.finish().unwrap();
+        assert_eq!(column.checksum(5..80_005).unwrap(), checksum);
+        assert_ne!(column.checksum(6..80_006).unwrap(), checksum);
+        column.write(79_000, [[1, 2, 3]]).unwrap();
+        assert_ne!(column.checksum(5..80_005).unwrap(), checksum);
     }
 
     #[test]

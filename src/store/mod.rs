@@ -18,7 +18,7 @@ mod scatter;
 mod shelf;
 
 pub use atomic_file::{PARTIAL, sync_folder, write_atomically};
-pub use column::{Column, Element};
+pub use column::{Column, ColumnWriter, Element};
 pub use error::StoreError;
 pub use fail_point::{FAIL_POINTS, KILL_AT, PANIC_AT, fail_point, panic_point};
 pub use ledger::{Ledger, Record};

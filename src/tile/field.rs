@@ -1,6 +1,6 @@
 //! The normal field of a tile: what a curvature stencil averages.
 
-use super::patch::each_triangle;
+use super::patch::{TakeTriangles, each_triangle};
 use crate::geometry::{DVec3, PlanBox, triangle_centroid, triangle_normal};
 use crate::index::{CellBlock, Index};
 use crate::store::StoreError;
@@ -24,10 +24,7 @@ impl NormalField {
     pub fn load(index: &Index, block: &CellBlock) -> Result<NormalField, StoreError> {
         let mut field = NormalField::empty(index, block);
         field.normals.reserve_exact(field.centroids.capacity());
-        each_triangle(index, block, |place, corners| {
-            put(&mut field.centroids, place, triangle_centroid(corners));
-            put(&mut field.normals, place, triangle_normal(corners));
-        })?;
+        each_triangle(index, block, &mut field)?;
         Ok(field)
     }
 
@@ -37,7 +34,7 @@ impl NormalField {
     /// The index cannot be read.
     pub fn load_centroids(index: &Index, block: &CellBlock) -> Result<NormalField, StoreError> {
         let mut field = NormalField::empty(index, block);
-        each_triangle(index, block, |place, corners| put(&mut field.centroids, place, triangle_centroid(corners)))?;
+        each_triangle(index, block, &mut Centroids(&mut field.centroids))?;
         Ok(field)
     }
 
@@ -55,11 +52,29 @@ impl NormalField {
     }
 }
 
-/// Puts a value in its place, which is at most the next.
-#[inline(always)]
-fn put(values: &mut Vec<DVec3>, place: usize, value: DVec3) {
-    match values.get_mut(place) {
-        Some(there) => *there = value,
-        None => values.push(value),
+impl TakeTriangles for NormalField {
+    #[inline(always)]
+    fn add(&mut self, corners: [DVec3; 3]) {
+        self.centroids.push(triangle_centroid(corners));
+        self.normals.push(triangle_normal(corners));
+    }
+
+    fn replace(&mut self, place: usize, corners: [DVec3; 3]) {
+        self.centroids[place] = triangle_centroid(corners);
+        self.normals[place] = triangle_normal(corners);
+    }
+}
+
+/// Centroids of triangles.
+struct Centroids<'a>(&'a mut Vec<DVec3>);
+
+impl TakeTriangles for Centroids<'_> {
+    #[inline(always)]
+    fn add(&mut self, corners: [DVec3; 3]) {
+        self.0.push(triangle_centroid(corners));
+    }
+
+    fn replace(&mut self, place: usize, corners: [DVec3; 3]) {
+        self.0[place] = triangle_centroid(corners);
     }
 }

@@ -1,6 +1,6 @@
 //! The mesh of a tile: core and halo, with what the cut left incomplete.
 
-use super::patch::{Patch, each_of};
+use super::patch::{Patch, read_of};
 use super::runs::Runs;
 use crate::geometry::{DVec3, triangle_area};
 use crate::index::{CellBlock, Index, MOST_COUNTED};
@@ -63,11 +63,9 @@ impl TileMesh {
             *valence = valence.saturating_add(1);
         }
         let everything = patch.corners.len() as u64 == index.scale.triangles;
-        let mut complete = Vec::with_capacity(valence.len());
-        each_of(index.valences(), &patch.vertices, |whole| {
-            let counted = whole < MOST_COUNTED && valence[complete.len()] == whole;
-            complete.push(counted || everything);
-        })?;
+        let whole = read_of(index.valences(), &patch.vertices)?;
+        let counted = valence.iter().zip(whole).map(|(&here, whole)| whole < MOST_COUNTED && here == whole);
+        let complete = counted.map(|counted| counted || everything).collect();
         let mut in_core = vec![false; patch.corners.len()];
         match owned {
             Owned::Cells(core) => {

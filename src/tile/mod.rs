@@ -16,6 +16,6 @@ mod runs;
 
 pub use field::NormalField;
 pub use mesh::{BYTES_PER_TRIANGLE, Owned, TileMesh};
-pub use patch::{Patch, each_of};
+pub use patch::{Patch, read_of};
 pub use plan::{CoreSize, Plan, Tile};
 pub use runs::Runs;

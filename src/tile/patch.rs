@@ -22,6 +22,8 @@ pub struct Patch {
 
 /// Vertices that lie so near one another in the index are read at one go.
 const READ_THROUGH: u64 = 256;
+/// Not more of them than so many.
+const READ_TOGETHER: u64 = 1 << 14;
 
 impl Patch {
     /// Reads a block of cells.
@@ -33,8 +35,7 @@ impl Patch {
         let inside = Runs::new(index.vertices.ranges(&index.grid, block));
         let (mut corners, outside) = corners(index, &triangles, &inside)?;
         let vertices = with_outside(&inside, outside, &mut corners);
-        let mut positions = Vec::with_capacity(vertices.len());
-        each_of(index.positions(), &vertices, |p| positions.push(DVec3::from_array(p)))?;
+        let positions = read_of(index.positions(), &vertices)?;
         Ok(Patch { vertices, positions, triangles, corners })
     }
 
@@ -44,37 +45,35 @@ impl Patch {
     }
 }
 
-/// Hands the corners (local metres) of every triangle of a block to `take` with its local number, nearly all in order:
-/// those with a vertex outside the block come twice, first with places that mean nothing, and at the end as they are.
+/// Takes the triangles of a block by their corners, local metres.
+pub(super) trait TakeTriangles {
+    /// The next triangle.
+    fn add(&mut self, corners: [DVec3; 3]);
+    /// Another one in the place of one that was added.
+    fn replace(&mut self, place: usize, corners: [DVec3; 3]);
+}
+
+/// Hands all triangles of a block to `to`, in order. Those with a vertex outside the block are added with places that
+/// mean nothing, and replaced at the end.
 ///
 /// # Errors
 /// The index cannot be read.
-pub(super) fn each_triangle(
-    index: &Index,
-    block: &CellBlock,
-    mut take: impl FnMut(usize, [DVec3; 3]),
-) -> Result<(), StoreError> {
+pub(super) fn each_triangle(index: &Index, block: &CellBlock, to: &mut impl TakeTriangles) -> Result<(), StoreError> {
     let inside = Runs::new(index.vertices.ranges(&index.grid, block));
-    let mut positions = Vec::with_capacity(inside.len());
-    each_of(index.positions(), &inside, |p| positions.push(DVec3::from_array(p)))?;
+    let positions = read_of(index.positions(), &inside)?;
     let mut lookup = Lookup::new(&inside);
     let mut cut: Vec<(usize, [u64; 3])> = Vec::new();
     let mut triangle = 0;
     for range in index.triangles.ranges(&index.grid, block) {
-        index.each_corners(range, |numbers| {
-            let mut corners = [DVec3::ZERO; 3];
-            let mut whole = true;
-            for (corner, &number) in corners.iter_mut().zip(&numbers) {
-                match lookup.local(number) {
-                    Some(v) => *corner = positions[v as usize],
-                    None => whole = false,
+        index.each_corners(range, |triangles| {
+            for &numbers in triangles {
+                let locals = numbers.map(|number| lookup.local(number));
+                if locals.contains(&None) {
+                    cut.push((triangle, numbers));
                 }
+                to.add(locals.map(|v| v.map_or(DVec3::ZERO, |v| positions[v as usize])));
+                triangle += 1;
             }
-            if !whole {
-                cut.push((triangle, numbers));
-            }
-            take(triangle, corners);
-            triangle += 1;
         })?;
     }
     let mut outside: Vec<u64> =
@@ -82,15 +81,14 @@ pub(super) fn each_triangle(
     outside.sort_unstable();
     outside.dedup();
     let outside = Runs::new(outside.into_iter().map(|v| v..v + 1).collect());
-    let mut beyond = Vec::with_capacity(outside.len());
-    each_of(index.positions(), &outside, |p| beyond.push(DVec3::from_array(p)))?;
+    let beyond = read_of(index.positions(), &outside)?;
     for (triangle, numbers) in cut {
         let position = |v: u64| match (inside.local(v), outside.local(v)) {
             (Some(local), _) => positions[local as usize],
             (None, Some(local)) => beyond[local as usize],
             (None, None) => DVec3::ZERO,
         };
-        take(triangle, numbers.map(position));
+        to.replace(triangle, numbers.map(position));
     }
     Ok(())
 }
@@ -102,11 +100,13 @@ fn corners(index: &Index, triangles: &Runs, inside: &Runs) -> Result<(Vec<[u32; 
     let mut outside = Vec::new();
     let mut lookup = Lookup::new(inside);
     for range in triangles.ranges() {
-        index.each_corners(range.clone(), |numbers| {
-            corners.push(numbers.map(|number| {
-                lookup.local(number).unwrap_or_else(|| {
-                    outside.push(number);
-                    (inside.len() + outside.len() - 1) as u32
+        index.each_corners(range.clone(), |triangles| {
+            corners.extend(triangles.iter().map(|numbers| {
+                numbers.map(|number| {
+                    lookup.local(number).unwrap_or_else(|| {
+                        outside.push(number);
+                        (inside.len() + outside.len() - 1) as u32
+                    })
                 })
             }));
         })?;
@@ -165,26 +165,31 @@ fn with_outside(inside: &Runs, met: Vec<u64>, corners: &mut [[u32; 3]]) -> Runs 
     all
 }
 
-/// Hands the elements of a column that belong to the runs to `take`, in order.
+/// Reads the elements of a column that belong to the runs.
 ///
 /// # Errors
 /// The column cannot be read.
-pub fn each_of<T: Element>(column: &Column<T>, runs: &Runs, mut take: impl FnMut(T)) -> Result<(), StoreError> {
+pub fn read_of<T: Element>(column: &Column<T>, runs: &Runs) -> Result<Vec<T>, StoreError> {
+    let mut found = Vec::with_capacity(runs.len());
     let mut rest = runs.ranges();
+    let mut through = Vec::new();
     while let Some(first) = rest.first() {
         // Short gaps are read and left out.
-        let near = rest.windows(2).take_while(|w| w[1].start - w[0].end <= READ_THROUGH).count() + 1;
+        let joins =
+            |w: &&[Range<u64>]| w[1].start - w[0].end <= READ_THROUGH && w[1].end - first.start <= READ_TOGETHER;
+        let near = rest.windows(2).take_while(joins).count() + 1;
         let (together, after) = rest.split_at(near);
         rest = after;
+        if together.len() == 1 {
+            column.read(first.clone(), &mut found)?;
+            continue;
+        }
         let end = together.last().map_or(first.end, |r| r.end);
-        let (mut at, mut i) = (first.start, 0);
-        column.each(first.start..end, |element| {
-            i += usize::from(at == together[i].end);
-            if at >= together[i].start {
-                take(element);
-            }
-            at += 1;
-        })?;
+        through.clear();
+        column.read(first.start..end, &mut through)?;
+        for range in together {
+            found.extend_from_slice(&through[(range.start - first.start) as usize..(range.end - first.start) as usize]);
+        }
     }
-    Ok(())
+    Ok(found)
 }
