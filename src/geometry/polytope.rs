@@ -31,7 +31,7 @@ impl Polytope<'_> {
         // A power of two changes no digit, and keeps products of three coordinates in range.
         let exponent = largest.log2().ceil().clamp(-1000.0, 1000.0);
         let down = 2f64.powi(-exponent as i32);
-        let mut growing = Growing::start(points.iter().map(|&p| p * down))?;
+        let mut growing = Growing::start(points.iter().map(|&p| p * down).collect())?;
         growing.finish()?;
         Ok(Polytope { points, facets: growing.facets() })
     }

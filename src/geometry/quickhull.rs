@@ -28,77 +28,36 @@ struct Facet {
     across: [u32; 3],
 }
 
-/// A point, and where it is in the lists. Half a cache line.
-#[derive(Debug, Clone, Copy)]
-struct Point {
-    at: DVec3,
-    /// The point that hangs after this one on the same facet.
-    next: u32,
-    /// The facet of the last fan around which the rim went on from here.
-    begins: u32,
-}
-
-/// The points that hang on a facet.
+/// The points that hang on a facet, and when it was last looked at.
 #[derive(Debug, Clone, Copy)]
 struct Above {
-    /// The first and the last of a chain of points, or none.
+    /// The first of a chain of points, or none.
     first: u32,
-    last: u32,
     highest: u32,
     height: f64,
+    /// Twice the insertion that looked at the facet, plus one if its corner sees the facet.
+    look: u32,
 }
 
-const NOTHING: Above = Above { first: NONE, last: NONE, highest: NONE, height: 0.0 };
+const NOTHING: Above = Above { first: NONE, highest: NONE, height: 0.0, look: 0 };
 
 /// An edge between a facet that the new corner sees and one that it does not.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 struct RimEdge {
     from: u32,
     to: u32,
     /// The facet that stays, and which of its edges this is.
     beyond: u32,
-    side: u32,
-}
-
-/// Facets side by side, so that a point is held against all of them without a branch for each.
-#[derive(Debug, Clone, Copy)]
-struct Planes {
-    normal: [[f64; Planes::MOST]; 3],
-    noise: [f64; Planes::MOST],
-    facets: [u32; Planes::MOST],
-}
-
-impl Planes {
-    const MOST: usize = 8;
-    /// Nothing is above these.
-    const NONE: Planes =
-        Planes { normal: [[0.0; Planes::MOST]; 3], noise: [-1.0; Planes::MOST], facets: [NONE; Planes::MOST] };
-
-    fn put(&mut self, i: usize, place: u32, facet: &Facet) {
-        (0..3).for_each(|k| self.normal[k][i] = facet.normal[k]);
-        (self.noise[i], self.facets[i]) = (facet.noise, place);
-    }
-
-    /// Heights above the facets of a point that lies so far from a point of all of them, and one byte for each
-    /// facet that is not 0 unless the point is surely below.
-    fn heights(&self, from: DVec3) -> ([f64; Planes::MOST], u64) {
-        let (mut height, mut not_below) = ([0.0; Planes::MOST], [0; Planes::MOST]);
-        let [x, y, z] = &self.normal;
-        for i in 0..Planes::MOST {
-            height[i] = x[i] * from.x + y[i] * from.y + z[i] * from.z;
-            not_below[i] = u8::from(height[i] >= -self.noise[i]);
-        }
-        (height, u64::from_le_bytes(not_below))
-    }
+    side: usize,
 }
 
 /// A polytope that still has points outside.
 pub(super) struct Growing {
-    points: Vec<Point>,
+    points: Vec<DVec3>,
     facets: Vec<Facet>,
     above: Vec<Above>,
-    /// Twice the insertion that looked at the facet last, plus one if its corner sees the facet.
-    look: Vec<u32>,
+    /// The point that hangs after this one on the same facet.
+    next: Vec<u32>,
     /// Facets on which points hang.
     open: Vec<u32>,
     /// Places of facets that were seen and are gone, to be taken again.
@@ -107,12 +66,11 @@ pub(super) struct Growing {
 
 impl Growing {
     /// A tetrahedron of extreme points, coordinates within 1.
-    pub(super) fn start(points: impl ExactSizeIterator<Item = DVec3>) -> Result<Growing, NoPolytope> {
+    pub(super) fn start(points: Vec<DVec3>) -> Result<Growing, NoPolytope> {
         if points.len() < 4 {
             return Err(NoPolytope::Flat);
         }
-        let points: Vec<Point> = points.map(|at| Point { at, next: NONE, begins: NONE }).collect();
-        let at = |i: u32| points[i as usize].at;
+        let at = |i: u32| points[i as usize];
         let a = extreme(&points, |p| -p.x - 0.1 * p.y - 0.01 * p.z);
         let b = extreme(&points, |p| (p - at(a)).length_squared());
         let c = extreme(&points, |p| (p - at(a)).cross(at(b) - at(a)).length_squared());
@@ -125,11 +83,12 @@ impl Growing {
         }
         let (b, c) = if side(d) > 0.0 { (c, b) } else { (b, c) };
         let first = [([a, b, c], [1, 2, 3]), ([a, d, b], [3, 2, 0]), ([b, d, c], [1, 3, 0]), ([c, d, a], [2, 1, 0])];
+        let n = points.len();
         let mut growing = Growing {
             points,
             facets: Vec::new(),
             above: vec![NOTHING; 4],
-            look: vec![0; 4],
+            next: vec![NONE; n],
             open: vec![3, 2, 1, 0],
             free: Vec::new(),
         };
@@ -137,8 +96,8 @@ impl Growing {
             let facet = growing.facet(corners, across);
             growing.facets.push(facet);
         }
-        for point in 0..growing.points.len() as u32 {
-            let p = growing.points[point as usize].at;
+        for point in 0..n as u32 {
+            let p = growing.points[point as usize];
             if let Some((facet, height)) = (0..4).map(|f| (f, growing.height(f, p))).find(|&(_, height)| height > 0.0) {
                 growing.hang(point, facet, height);
             }
@@ -147,7 +106,7 @@ impl Growing {
     }
 
     fn facet(&self, corners: [u32; 3], across: [u32; 3]) -> Facet {
-        let [a, b, c] = corners.map(|i| self.points[i as usize].at);
+        let [a, b, c] = corners.map(|i| self.points[i as usize]);
         let (u, v) = (b - a, c - a);
         let plus = DVec3::new(u.y * v.z, u.z * v.x, u.x * v.y);
         let minus = DVec3::new(u.z * v.y, u.x * v.z, u.y * v.x);
@@ -168,136 +127,107 @@ impl Growing {
     #[cold]
     fn doubtful_height(&self, facet: u32, p: DVec3) -> f64 {
         let f = &self.facets[facet as usize];
-        let exact = height_exactly(f.corners.map(|i| self.points[i as usize].at), p);
+        let exact = height_exactly(f.corners.map(|i| self.points[i as usize]), p);
         if exact > 0.0 { exact.max(f64::MIN_POSITIVE) } else { 0.0 }
     }
 
     fn hang(&mut self, point: u32, facet: u32, height: f64) {
         let above = &mut self.above[facet as usize];
-        self.points[point as usize].next = above.first;
-        above.last = if above.first == NONE { point } else { above.last };
+        self.next[point as usize] = above.first;
         above.first = point;
-        let higher = height > above.height;
-        above.highest = if higher { point } else { above.highest };
-        above.height = if higher { height } else { above.height };
+        if height > above.height {
+            (above.height, above.highest) = (height, point);
+        }
     }
 
     /// Makes corners of points until none is outside.
     pub(super) fn finish(&mut self) -> Result<(), NoPolytope> {
-        let (mut seen, mut rim, mut fan) = (Vec::new(), Vec::new(), Vec::new());
+        let mut begins_at = vec![NONE; self.points.len()];
+        let (mut seen, mut rim, mut fan, mut chains) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let mut insertion = 0;
         // The last first: its neighbourhood is still in the cache.
         while let Some(facet) = self.open.pop() {
-            let Above { first, highest: corner, .. } = self.above[facet as usize];
-            if first == NONE {
+            let corner = self.above[facet as usize].highest;
+            if self.above[facet as usize].first == NONE {
                 continue;
             }
             insertion += 1;
-            let (seen, rim) = self.look_around(facet, corner, insertion, &mut seen, &mut rim);
-            let mut point = self.take_down(seen);
-            self.fan_out(corner, rim, &mut fan)?;
-            let p = self.points[corner as usize].at;
-            while point != NONE {
-                let following = self.points[point as usize].next;
-                if point != corner {
-                    self.move_to_fan(point, p, &fan);
+            self.look_around(facet, corner, insertion, &mut seen, &mut rim);
+            chains.clear();
+            chains.extend(seen.iter().map(|&f| self.above[f as usize].first));
+            seen.iter().for_each(|&f| self.above[f as usize] = NOTHING);
+            self.free.extend_from_slice(&seen);
+            self.fan_out(corner, &rim, &mut fan, &mut begins_at)?;
+            let p = self.points[corner as usize];
+            for &chain in &chains {
+                let mut point = chain;
+                while point != NONE {
+                    let following = self.next[point as usize];
+                    if point != corner {
+                        self.move_to_fan(point, p, &fan);
+                    }
+                    point = following;
                 }
-                point = following;
             }
-            for &facet in fan.iter().flat_map(|planes| &planes.facets).take(rim.len()) {
-                // Without a branch: whether points hang on it is as good as random.
-                let places = self.open.len();
-                self.open.push(facet);
-                self.open.truncate(places + usize::from(self.above[facet as usize].first != NONE));
-            }
+            self.open.extend(fan.iter().map(|f| f.0).filter(|&f| self.above[f as usize].first != NONE));
         }
         Ok(())
     }
 
-    /// The facets that a new corner sees, from one of them on, and the edges around them. The lists are longer than
-    /// what is in them, so that nothing needs a branch of its own.
-    fn look_around<'l>(
-        &mut self,
-        facet: u32,
-        corner: u32,
-        insertion: u32,
-        seen: &'l mut Vec<u32>,
-        rim: &'l mut Vec<RimEdge>,
-    ) -> (&'l [u32], &'l [RimEdge]) {
-        let p = self.points[corner as usize].at;
-        let (mut done, mut found, mut edges) = (0, 1, 0);
-        self.look[facet as usize] = 2 * insertion + 1;
-        seen.resize(seen.len().max(64), NONE);
-        seen[0] = facet;
-        while done < found {
-            if seen.len() < found + 3 {
-                seen.resize(2 * found, NONE);
-            }
-            if rim.len() < edges + 3 {
-                rim.resize(2 * edges + 64, RimEdge::default());
-            }
-            let f = seen[done];
+    /// The facets that a new corner sees, from one of them on, and the edges around them.
+    fn look_around(&mut self, facet: u32, corner: u32, insertion: u32, seen: &mut Vec<u32>, rim: &mut Vec<RimEdge>) {
+        let p = self.points[corner as usize];
+        seen.clear();
+        rim.clear();
+        seen.push(facet);
+        self.above[facet as usize].look = 2 * insertion + 1;
+        let mut done = 0;
+        while let Some(&f) = seen.get(done) {
             done += 1;
             let Facet { corners, across, .. } = self.facets[f as usize];
             for side in 0..3 {
                 let beyond = across[side];
-                let sees = u32::from(self.height(beyond, p) > 0.0);
-                let look = &mut self.look[beyond as usize];
-                let fresh = *look < 2 * insertion;
-                *look = if fresh { 2 * insertion + sees } else { *look };
-                let sees = *look & 1;
-                seen[found] = beyond;
-                found += usize::from(fresh) & sees as usize;
-                let back = self.facets[beyond as usize].across;
-                let back = if back[0] == f { 0 } else { 1 + u32::from(back[1] != f) };
-                rim[edges] = RimEdge { from: corners[side], to: corners[(side + 1) % 3], beyond, side: back };
-                edges += 1 - sees as usize;
+                let mut look = self.above[beyond as usize].look;
+                if look < 2 * insertion {
+                    look = 2 * insertion + u32::from(self.height(beyond, p) > 0.0);
+                    self.above[beyond as usize].look = look;
+                    if look & 1 == 1 {
+                        seen.push(beyond);
+                    }
+                }
+                if look & 1 == 0 {
+                    let back = self.facets[beyond as usize].across;
+                    let back = if back[0] == f { 0 } else { 1 + usize::from(back[1] != f) };
+                    rim.push(RimEdge { from: corners[side], to: corners[(side + 1) % 3], beyond, side: back });
+                }
             }
         }
-        (&seen[..found], &rim[..edges])
-    }
-
-    /// Takes the facets away, and returns the first of all points that hung on them, now one chain.
-    fn take_down(&mut self, seen: &[u32]) -> u32 {
-        let (mut first, mut last) = (NONE, NONE);
-        for &facet in seen {
-            let above = std::mem::replace(&mut self.above[facet as usize], NOTHING);
-            if above.first == NONE {
-                continue;
-            }
-            match self.points.get_mut(last as usize) {
-                None => first = above.first,
-                Some(last) => last.next = above.first,
-            }
-            last = above.last;
-        }
-        self.free.extend_from_slice(seen);
-        first
     }
 
     /// Puts a fan around the new corner in place of the seen facets.
-    fn fan_out(&mut self, corner: u32, rim: &[RimEdge], fan: &mut Vec<Planes>) -> Result<(), NoPolytope> {
+    fn fan_out(
+        &mut self,
+        corner: u32,
+        rim: &[RimEdge],
+        fan: &mut Vec<(u32, DVec3, f64)>,
+        begins_at: &mut [u32],
+    ) -> Result<(), NoPolytope> {
         fan.clear();
-        for edges in rim.chunks(Planes::MOST) {
-            let mut planes = Planes::NONE;
-            for (i, edge) in edges.iter().enumerate() {
-                let facet = self.facet([corner, edge.from, edge.to], [NONE, edge.beyond, NONE]);
-                let place = self.free.pop().unwrap_or(self.facets.len() as u32);
-                if place as usize == self.facets.len() {
-                    self.facets.push(facet);
-                    self.above.push(NOTHING);
-                    self.look.push(0);
-                } else {
-                    self.facets[place as usize] = facet;
-                }
-                self.facets[edge.beyond as usize].across[edge.side as usize] = place;
-                self.points[edge.from as usize].begins = place;
-                planes.put(i, place, &facet);
+        for edge in rim {
+            let facet = self.facet([corner, edge.from, edge.to], [NONE, edge.beyond, NONE]);
+            let place = self.free.pop().unwrap_or(self.facets.len() as u32);
+            if place as usize == self.facets.len() {
+                self.facets.push(facet);
+                self.above.push(NOTHING);
+            } else {
+                self.facets[place as usize] = facet;
             }
-            fan.push(planes);
+            self.facets[edge.beyond as usize].across[edge.side] = place;
+            begins_at[edge.from as usize] = place;
+            fan.push((place, facet.normal, facet.noise));
         }
-        for (edge, &place) in rim.iter().zip(fan.iter().flat_map(|planes| &planes.facets)) {
-            let after = self.points[edge.to as usize].begins;
+        for (edge, &(place, ..)) in rim.iter().zip(fan.iter()) {
+            let after = begins_at[edge.to as usize];
             let closed = self.facets.get(after as usize).is_some_and(|f| f.corners[..2] == [corner, edge.to]);
             if !closed {
                 return Err(NoPolytope::OutOfRange);
@@ -308,22 +238,18 @@ impl Growing {
         Ok(())
     }
 
-    /// Hangs a point on the first facet of the fan around `corner` that it is above, or drops it: it is then inside.
-    fn move_to_fan(&mut self, point: u32, corner: DVec3, fan: &[Planes]) {
-        let p = self.points[point as usize].at;
-        for planes in fan {
-            let (heights, mut not_below) = planes.heights(p - corner);
-            while not_below != 0 {
-                let i = not_below.trailing_zeros() as usize / 8;
-                let (facet, mut height) = (planes.facets[i], heights[i]);
-                if height.abs() <= planes.noise[i] {
-                    height = self.doubtful_height(facet, p);
-                }
-                if height > 0.0 {
-                    self.hang(point, facet, height);
-                    return;
-                }
-                not_below &= not_below - 1;
+    /// Hangs a point on a facet of the fan around `corner`, or drops it: it is then inside.
+    fn move_to_fan(&mut self, point: u32, corner: DVec3, fan: &[(u32, DVec3, f64)]) {
+        let p = self.points[point as usize];
+        let from_corner = p - corner;
+        for &(facet, normal, noise) in fan {
+            let mut height = normal.dot(from_corner);
+            if height.abs() <= noise {
+                height = self.doubtful_height(facet, p);
+            }
+            if height > 0.0 {
+                self.hang(point, facet, height);
+                return;
             }
         }
     }
@@ -335,17 +261,24 @@ impl Growing {
     }
 }
 
-/// The first of the points for which `of` is greatest.
-fn extreme(points: &[Point], of: impl Fn(DVec3) -> f64) -> u32 {
+/// The first of the points for which `of` is greatest. In blocks, so that most of the work needs no branch.
+fn extreme(points: &[DVec3], of: impl Fn(DVec3) -> f64) -> u32 {
+    const BLOCK: usize = 64;
+    const LANES: usize = 4;
     let (mut most, mut at) = (f64::NEG_INFINITY, 0);
-    for (block, first) in points.chunks(64).zip((0u32..).step_by(64)) {
-        let here = block.iter().fold(f64::NEG_INFINITY, |most, p| {
-            let x = of(p.at);
-            if x > most { x } else { most }
-        });
+    for (block, first) in points.chunks(BLOCK).zip((0u32..).step_by(BLOCK)) {
+        let mut values = [f64::NEG_INFINITY; BLOCK];
+        for (value, &p) in values.iter_mut().zip(block) {
+            *value = of(p);
+        }
+        let mut highest = [f64::NEG_INFINITY; LANES];
+        for values in values.as_chunks::<LANES>().0 {
+            (0..LANES).for_each(|i| highest[i] = if values[i] > highest[i] { values[i] } else { highest[i] });
+        }
+        let here = highest.into_iter().fold(f64::NEG_INFINITY, f64::max);
         if here > most {
             most = here;
-            at = first + block.iter().position(|p| of(p.at) == here).unwrap_or(0) as u32;
+            at = first + values.iter().position(|&value| value == here).unwrap_or(0) as u32;
         }
     }
     at
