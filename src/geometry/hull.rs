@@ -1,6 +1,7 @@
 //! Area, volume and sphericity of convex hulls.
 
 use super::DVec3;
+use super::extremes::{BLOCK, greatest, least};
 use super::polytope::{NoPolytope, Polytope};
 use robust::{Coord, orient2d};
 
@@ -34,12 +35,13 @@ pub fn hull(points: &[DVec3]) -> Option<Hull> {
 /// Decided by bounds where they suffice: the hull contains that of a few extreme points, and is contained
 /// in the planes that touch it there.
 pub fn flatter_than(points: &[DVec3], threshold: f64) -> bool {
-    let Some(&first) = points.first() else { return threshold > 0.0 };
+    if points.is_empty() {
+        return threshold > 0.0;
+    }
     if points.len() >= FEW {
-        let relative: Vec<DVec3> = points.iter().map(|&p| p - first).collect();
         // Most stones are far from flat, and most sheets far from round: a few directions tell.
         for pairs in PAIRS {
-            let Some([inner, outer]) = bounds(&relative, pairs) else { break };
+            let Some([inner, outer]) = bounds(points, pairs) else { break };
             // The slack is far above rounding and far below what matters.
             if sphericity(inner.volume_m3, outer.area_m2) > threshold * (1.0 + 1e-6) {
                 return false;
@@ -59,7 +61,8 @@ const PAIRS: [usize; 2] = [14, 32];
 /// Below this many points a hull is cheaper than its bounds.
 const FEW: usize = 300;
 
-/// A hull within the points' own, and one around it; none where the points are flat or nearly so.
+/// A hull within the points' own, and one around it, both relative to the first point; none where the points are
+/// flat or nearly so.
 fn bounds(points: &[DVec3], pairs: usize) -> Option<[Hull; 2]> {
     let (extremes, planes) = supports(points, pairs);
     let inner = Polytope::around(&extremes).ok()?;
@@ -86,24 +89,24 @@ fn bounds(points: &[DVec3], pairs: usize) -> Option<[Hull; 2]> {
     Some([inner.hull(), outer.hull()])
 }
 
-/// The extreme points in the directions, and the planes there: outward direction and level.
+/// The extreme points in the directions, and the planes there: outward direction and level. Relative to the first point.
 fn supports(points: &[DVec3], pairs: usize) -> (Vec<DVec3>, Vec<(DVec3, f64)>) {
     let directions: Vec<DVec3> = (0..pairs).map(|pair| direction(pair, pairs)).collect();
     // For each pair, how far the points reach both ways, and which are there.
-    let mut reach = vec![([f64::INFINITY, f64::NEG_INFINITY], [points[0]; 2]); pairs];
+    let mut reach = vec![([f64::INFINITY, f64::NEG_INFINITY], [DVec3::ZERO; 2]); pairs];
     // In blocks, so that most of the work needs no branch and no memory.
     for block in points.chunks(BLOCK) {
-        let across = Across::of(block);
+        let across = Across::of(block, points[0]);
         for (direction, ([low, high], [lowest, highest])) in directions.iter().zip(&mut reach) {
-            let [least, most] = across.range(*direction);
-            let at = |level: f64| block.iter().copied().find(|p| direction.dot(*p) == level);
-            if least < *low {
-                *low = least;
-                *lowest = at(least).unwrap_or(*lowest);
+            let [lower, upper] = across.range(*direction);
+            let at = |level: f64| block.iter().map(|&p| p - points[0]).find(|p| direction.dot(*p) == level);
+            if lower < *low {
+                *low = lower;
+                *lowest = at(lower).unwrap_or(*lowest);
             }
-            if most > *high {
-                *high = most;
-                *highest = at(most).unwrap_or(*highest);
+            if upper > *high {
+                *high = upper;
+                *highest = at(upper).unwrap_or(*highest);
             }
         }
     }
@@ -112,36 +115,26 @@ fn supports(points: &[DVec3], pairs: usize) -> (Vec<DVec3>, Vec<(DVec3, f64)>) {
     (extremes, planes)
 }
 
-/// Points that are looked at together.
-const BLOCK: usize = 64;
-/// Of these, how many at once.
-const LANES: usize = 4;
-
 /// The coordinates of a block of points, each for itself. The last block is filled up with its first point.
-struct Across([[[f64; LANES]; BLOCK / LANES]; 3]);
+struct Across([[f64; BLOCK]; 3]);
 
 impl Across {
-    fn of(block: &[DVec3]) -> Across {
-        let mut across = [[[0.0; LANES]; BLOCK / LANES]; 3];
-        for (i, p) in block.iter().chain(std::iter::repeat(&block[0])).take(BLOCK).enumerate() {
-            (0..3).for_each(|k| across[k][i / LANES][i % LANES] = p[k]);
+    fn of(block: &[DVec3], origin: DVec3) -> Across {
+        let [mut x, mut y, mut z] = (block[0] - origin).to_array().map(|first| [first; BLOCK]);
+        for (((p, x), y), z) in block.iter().zip(&mut x).zip(&mut y).zip(&mut z) {
+            [*x, *y, *z] = (*p - origin).to_array();
         }
-        Across(across)
+        Across([x, y, z])
     }
 
     /// The least and the greatest level in a direction.
     fn range(&self, direction: DVec3) -> [f64; 2] {
-        let (mut least, mut most) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
         let [x, y, z] = &self.0;
-        for ((x, y), z) in x.iter().zip(y).zip(z) {
-            for lane in 0..LANES {
-                let level = direction.x * x[lane] + direction.y * y[lane] + direction.z * z[lane];
-                least[lane] = if level < least[lane] { level } else { least[lane] };
-                most[lane] = if level > most[lane] { level } else { most[lane] };
-            }
+        let mut levels = [0.0; BLOCK];
+        for i in 0..BLOCK {
+            levels[i] = direction.x * x[i] + direction.y * y[i] + direction.z * z[i];
         }
-        let least = least.into_iter().fold(f64::INFINITY, f64::min);
-        [least, most.into_iter().fold(f64::NEG_INFINITY, f64::max)]
+        [least(&levels), greatest(&levels)]
     }
 }
 

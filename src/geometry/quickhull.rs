@@ -12,6 +12,7 @@
 //! tolerance and no merging of facets.
 
 use super::DVec3;
+use super::extremes::{BLOCK, greatest};
 use super::polytope::NoPolytope;
 use robust::{Coord3D, orient3d};
 
@@ -263,19 +264,13 @@ impl Growing {
 
 /// The first of the points for which `of` is greatest. In blocks, so that most of the work needs no branch.
 fn extreme(points: &[DVec3], of: impl Fn(DVec3) -> f64) -> u32 {
-    const BLOCK: usize = 64;
-    const LANES: usize = 4;
     let (mut most, mut at) = (f64::NEG_INFINITY, 0);
     for (block, first) in points.chunks(BLOCK).zip((0u32..).step_by(BLOCK)) {
         let mut values = [f64::NEG_INFINITY; BLOCK];
         for (value, &p) in values.iter_mut().zip(block) {
             *value = of(p);
         }
-        let mut highest = [f64::NEG_INFINITY; LANES];
-        for values in values.as_chunks::<LANES>().0 {
-            (0..LANES).for_each(|i| highest[i] = if values[i] > highest[i] { values[i] } else { highest[i] });
-        }
-        let here = highest.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        let here = greatest(&values);
         if here > most {
             most = here;
             at = first + values.iter().position(|&value| value == here).unwrap_or(0) as u32;

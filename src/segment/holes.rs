@@ -16,12 +16,16 @@ pub fn fill_holes(mesh: &TileMesh, adjacency: &Adjacency, settings: &SegmentSett
     let mut contact = vec![NONE; pockets.count()];
     for (pocket, run) in pockets.runs() {
         let Some(contact) = contact.get_mut(pocket as usize) else { continue };
-        for &v in mesh.triangles[run].as_flattened() {
-            let touching = touching[v as usize];
-            if touching != NONE && *contact & !UNSURE != SEVERAL {
-                *contact = merge(*contact, touching);
+        let mut all = *contact;
+        for corners in &mesh.triangles[run] {
+            if all & !UNSURE == SEVERAL {
+                break;
+            }
+            for touching in corners.map(|v| touching[v as usize]).into_iter().filter(|&t| t != NONE) {
+                all = merge(all, touching);
             }
         }
+        *contact = all;
     }
     drop(touching);
     let undecided = |pocket: usize| contact[pocket] & !UNSURE != SEVERAL && contact[pocket] & !UNSURE != OVERSIZE;
