@@ -51,7 +51,8 @@ pub fn tell_apart(
         if node == NONE {
             continue;
         }
-        let fate = if too_small[node as usize] { Fate::Gone } else { *fate.get(node as usize).unwrap_or(&Fate::Unknown) };
+        let fate =
+            if too_small[node as usize] { Fate::Gone } else { *fate.get(node as usize).unwrap_or(&Fate::Unknown) };
         let (becomes, body) = match fate {
             Fate::Gone => (State::Removed, NONE),
             Fate::Unknown => (State::Unknown, NONE),
