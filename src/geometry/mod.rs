@@ -3,6 +3,7 @@
 //! All lengths are metres in the survey's local frame (see [`crate::open::Frame`]): x east, y north,
 //! z up, relative to an origin near the survey, so that `f64` keeps nanometres.
 
+mod extremes;
 mod hull;
 mod polytope;
 mod quickhull;

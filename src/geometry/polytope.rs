@@ -14,16 +14,16 @@ pub(super) enum NoPolytope {
 
 /// A convex polytope, facets outward.
 #[derive(Debug)]
-pub(super) struct Polytope {
+pub(super) struct Polytope<'a> {
     /// All points that it was made from; corners are some of them.
-    pub points: Vec<DVec3>,
+    pub points: &'a [DVec3],
     /// Corners of every facet, counter-clockwise seen from outside.
     pub facets: Vec<[u32; 3]>,
 }
 
-impl Polytope {
+impl Polytope<'_> {
     /// The polytope around some points. Its last bits depend on their order.
-    pub(super) fn around(points: &[DVec3]) -> Result<Polytope, NoPolytope> {
+    pub(super) fn around(points: &[DVec3]) -> Result<Polytope<'_>, NoPolytope> {
         let largest = points.iter().fold(0.0f64, |most, p| most.max(p.abs().max_element()));
         if !points.iter().all(|p| p.is_finite()) || points.len() > i32::MAX as usize {
             return Err(NoPolytope::OutOfRange);
@@ -33,7 +33,7 @@ impl Polytope {
         let down = 2f64.powi(-exponent as i32);
         let mut growing = Growing::start(points.iter().map(|&p| p * down).collect())?;
         growing.finish()?;
-        Ok(Polytope { points: points.to_vec(), facets: growing.facets() })
+        Ok(Polytope { points, facets: growing.facets() })
     }
 }
 

@@ -12,6 +12,7 @@
 //! tolerance and no merging of facets.
 
 use super::DVec3;
+use super::extremes::{BLOCK, greatest};
 use super::polytope::NoPolytope;
 use robust::{Coord3D, orient3d};
 
@@ -67,26 +68,16 @@ pub(super) struct Growing {
 impl Growing {
     /// A tetrahedron of extreme points, coordinates within 1.
     pub(super) fn start(points: Vec<DVec3>) -> Result<Growing, NoPolytope> {
-        let extreme = |of: &dyn Fn(DVec3) -> f64| {
-            let (mut most, mut at) = (f64::NEG_INFINITY, 0);
-            for (i, &p) in points.iter().enumerate() {
-                let x = of(p);
-                if x > most {
-                    (most, at) = (x, i as u32);
-                }
-            }
-            at
-        };
         if points.len() < 4 {
             return Err(NoPolytope::Flat);
         }
         let at = |i: u32| points[i as usize];
-        let a = extreme(&|p| -p.x - 0.1 * p.y - 0.01 * p.z);
-        let b = extreme(&|p| (p - at(a)).length_squared());
-        let c = extreme(&|p| (p - at(a)).cross(at(b) - at(a)).length_squared());
+        let a = extreme(&points, |p| -p.x - 0.1 * p.y - 0.01 * p.z);
+        let b = extreme(&points, |p| (p - at(a)).length_squared());
+        let c = extreme(&points, |p| (p - at(a)).cross(at(b) - at(a)).length_squared());
         let normal = (at(b) - at(a)).cross(at(c) - at(a));
         let side = |d: u32| height_exactly([at(a), at(b), at(c)], at(d));
-        let mut d = extreme(&|p| normal.dot(p - at(a)).abs());
+        let mut d = extreme(&points, |p| normal.dot(p - at(a)).abs());
         if side(d) == 0.0 {
             // Rounding may hide the only point that is not in the plane.
             d = (0..points.len() as u32).find(|&i| side(i) != 0.0).ok_or(NoPolytope::Flat)?;
@@ -269,6 +260,23 @@ impl Growing {
         self.free.iter().for_each(|&f| self.facets[f as usize].corners = [NONE; 3]);
         self.facets.iter().map(|f| f.corners).filter(|corners| corners[0] != NONE).collect()
     }
+}
+
+/// The first of the points for which `of` is greatest. In blocks, so that most of the work needs no branch.
+fn extreme(points: &[DVec3], of: impl Fn(DVec3) -> f64) -> u32 {
+    let (mut most, mut at) = (f64::NEG_INFINITY, 0);
+    for (block, first) in points.chunks(BLOCK).zip((0u32..).step_by(BLOCK)) {
+        let mut values = [f64::NEG_INFINITY; BLOCK];
+        for (value, &p) in values.iter_mut().zip(block) {
+            *value = of(p);
+        }
+        let here = greatest(&values);
+        if here > most {
+            most = here;
+            at = first + values.iter().position(|&value| value == here).unwrap_or(0) as u32;
+        }
+    }
+    at
 }
 
 /// Six times the volume between a triangle and a point, with the sign of the height above it exact.

@@ -35,8 +35,8 @@ impl Patch {
 
 /// A set of vertices that knows the place of each in their ascending order.
 enum Places {
-    /// One bit for each number from the lowest on, in words of 64, and how many are set before each word.
-    Dense { lowest: u32, words: Vec<u64>, before: Vec<u32> },
+    /// For every 32 numbers from the lowest on, one bit each, and above these how many are in the set before them.
+    Dense { lowest: u32, words: Vec<u64> },
     /// All numbers, ascending: for few vertices far apart in a large tile.
     Sparse(Vec<u32>),
 }
@@ -44,11 +44,11 @@ enum Places {
 impl Places {
     fn of(corners: impl ExactSizeIterator<Item = [u32; 3]> + Clone) -> Places {
         let (mut lowest, mut highest) = (u32::MAX, 0);
-        for v in corners.clone().flatten() {
-            (lowest, highest) = (lowest.min(v), highest.max(v));
+        for [a, b, c] in corners.clone() {
+            (lowest, highest) = (lowest.min(a).min(b).min(c), highest.max(a).max(b).max(c));
         }
-        let words = (highest.saturating_sub(lowest) / 64) as usize + 1;
-        if words > 8 * corners.len() {
+        let words = (highest.saturating_sub(lowest) / 32) as usize + 1;
+        if words > 16 * corners.len() {
             let mut sorted: Vec<u32> = corners.flatten().collect();
             sorted.sort_unstable();
             sorted.dedup();
@@ -56,28 +56,25 @@ impl Places {
         }
         let mut words = vec![0u64; words];
         for v in corners.flatten() {
-            words[((v - lowest) / 64) as usize] |= 1 << ((v - lowest) % 64);
+            words[((v - lowest) / 32) as usize] |= 1 << ((v - lowest) % 32);
         }
         let mut count = 0;
-        let before = words
-            .iter()
-            .map(|word| {
-                let before = count;
-                count += word.count_ones();
-                before
-            })
-            .collect();
-        Places::Dense { lowest, words, before }
+        for word in &mut words {
+            let here = word.count_ones();
+            *word |= count << 32;
+            count += u64::from(here);
+        }
+        Places::Dense { lowest, words }
     }
 
     /// All vertices, ascending.
     fn vertices(&self) -> Vec<u32> {
         match self {
             Places::Sparse(sorted) => sorted.clone(),
-            Places::Dense { lowest, words, .. } => {
+            Places::Dense { lowest, words } => {
                 let mut vertices = Vec::new();
-                for (first, &word) in (*lowest..).step_by(64).zip(words) {
-                    let mut left = word;
+                for (first, &word) in (*lowest..).step_by(32).zip(words) {
+                    let mut left = word as u32;
                     while left != 0 {
                         vertices.push(first + left.trailing_zeros());
                         left &= left - 1;
@@ -92,9 +89,9 @@ impl Places {
     fn of_vertex(&self, v: u32) -> u32 {
         match self {
             Places::Sparse(sorted) => sorted.partition_point(|&other| other < v) as u32,
-            Places::Dense { lowest, words, before } => {
-                let (word, bit) = (((v - lowest) / 64) as usize, (v - lowest) % 64);
-                before[word] + (words[word] & ((1 << bit) - 1)).count_ones()
+            Places::Dense { lowest, words } => {
+                let word = words[((v - lowest) / 32) as usize];
+                (word >> 32) as u32 + (word as u32 & ((1 << ((v - lowest) % 32)) - 1)).count_ones()
             }
         }
     }

@@ -27,8 +27,8 @@ pub fn tell_apart(
     settings: &SegmentSettings,
 ) -> Labels {
     // Whatever the truth is, a body contains its kept component, and lies within the possible one.
-    let kept = Components::of(adjacency, |t| state[t] == State::Kept);
-    let size = kept.sizes(mesh, sizes);
+    let kept = Components::sized(mesh, adjacency, sizes, |t| state[t] == State::Kept);
+    let size = kept.size.clone();
     let open = kept.holding(adjacency.open());
     let unknown = unknown(&state);
     let doubtful = kept.beside(adjacency, &unknown);
@@ -42,14 +42,24 @@ pub fn tell_apart(
         })
         .collect();
     let Possible { node: mut label, too_small } = Possible::of(mesh, adjacency, sizes, &unknown, kept.of, (size, open));
-    for (state, label) in state.iter_mut().zip(&mut label).filter(|(_, node)| **node != NONE) {
-        let node = *label as usize;
-        let fate = if too_small[node] { Fate::Gone } else { *fate.get(node).unwrap_or(&Fate::Unknown) };
-        (*state, *label) = match fate {
+    let mut start = 0;
+    while let Some(&node) = label.get(start) {
+        // Triangles of one node mostly follow one another.
+        let run = label[start..].iter().take_while(|other| **other == node).count();
+        let here = start..start + run;
+        start = here.end;
+        if node == NONE {
+            continue;
+        }
+        let fate =
+            if too_small[node as usize] { Fate::Gone } else { *fate.get(node as usize).unwrap_or(&Fate::Unknown) };
+        let (becomes, body) = match fate {
             Fate::Gone => (State::Removed, NONE),
             Fate::Unknown => (State::Unknown, NONE),
             Fate::Body(body) => (State::Kept, body),
         };
+        state[here.clone()].fill(becomes);
+        label[here].fill(body);
     }
     Labels { state, label }
 }

@@ -5,6 +5,7 @@ use super::adjacency::Adjacency;
 use super::state::NONE;
 use crate::geometry::PlanBox;
 use crate::tile::TileMesh;
+use std::ops::Range;
 
 /// A partition of the selected triangles into components, numbered by ascending lowest triangle.
 pub struct Components {
@@ -12,41 +13,70 @@ pub struct Components {
     pub of: Vec<u32>,
     /// Lowest local triangle of each component.
     pub lowest: Vec<u32>,
+    /// Size of each component: exact where it is below what was asked for, and not below that elsewhere.
+    pub size: Vec<u64>,
 }
 
 impl Components {
     /// Components of the triangles for which `selected` holds.
     pub fn of(adjacency: &Adjacency, selected: impl Fn(usize) -> bool) -> Components {
-        // First the way to a lower triangle of the same component, or to itself; `NONE` if not selected.
+        Components::at_least(adjacency, selected, 0, |_| 0)
+    }
+
+    /// The same, and which of them are as large as the smallest grain.
+    pub fn sized(
+        mesh: &TileMesh,
+        adjacency: &Adjacency,
+        sizes: &Sizes,
+        selected: impl Fn(usize) -> bool,
+    ) -> Components {
+        Components::at_least(adjacency, selected, sizes.smallest, |t| sizes.of(mesh, t))
+    }
+
+    /// Components, each measured until it is known to be so large.
+    fn at_least(
+        adjacency: &Adjacency,
+        selected: impl Fn(usize) -> bool,
+        enough: u64,
+        size_of: impl Fn(u32) -> u64,
+    ) -> Components {
+        // First the way to a lower triangle of the same component, or to itself; `NONE` if not selected, or not
+        // yet looked at. `NONE` is above all of them.
         let mut of = vec![NONE; adjacency.len()];
         for t in (0..of.len()).filter(|&t| selected(t)) {
-            let here = t as u32;
-            let mut low = here;
-            for side in adjacency.sides(t) {
-                if side < here && of[side as usize] != NONE {
-                    let other = root(&mut of, side);
-                    if low != here && low != other {
-                        of[low.max(other) as usize] = low.min(other);
-                    }
-                    low = low.min(other);
-                }
+            let sides = adjacency.sides(t);
+            let ways = sides.map(|side| of[side as usize]);
+            let low = ways[0].min(ways[1]).min(ways[2]);
+            if low == NONE {
+                of[t] = t as u32;
+                continue;
             }
-            of[t] = low;
+            // Nearly always all lead to the lowest at once.
+            let one = ways.iter().fold(true, |one, &way| one & ((way == low) | (way == NONE)));
+            of[t] = if one && of[low as usize] == low { low } else { join_sides(&mut of, sides) };
         }
         for fork in adjacency.forks() {
             join_all(&mut of, fork.iter().copied().filter(|&t| selected(t as usize)));
         }
-        let mut lowest = Vec::new();
+        let (mut lowest, mut size) = (Vec::new(), Vec::new());
         for t in 0..of.len() {
+            if of[t] == NONE {
+                continue;
+            }
             if of[t] == t as u32 {
                 of[t] = lowest.len() as u32;
                 lowest.push(t as u32);
-            } else if of[t] != NONE {
+                size.push(0);
+            } else {
                 // The way leads downward, where numbers of components stand already.
                 of[t] = of[of[t] as usize];
             }
+            let size = &mut size[of[t] as usize];
+            if *size < enough {
+                *size += size_of(t as u32);
+            }
         }
-        Components { of, lowest }
+        Components { of, lowest, size }
     }
 
     /// How many components there are.
@@ -54,18 +84,14 @@ impl Components {
         self.lowest.len()
     }
 
-    /// Size of each component in the unit of [`Sizes`]: exact where it is below the smallest grain, and not
-    /// below it elsewhere.
-    pub fn sizes(&self, mesh: &TileMesh, sizes: &Sizes) -> Vec<u64> {
-        let mut size = vec![0; self.count()];
-        for (t, &part) in self.of.iter().enumerate() {
-            if let Some(size) = size.get_mut(part as usize)
-                && *size < sizes.smallest
-            {
-                *size += sizes.of(mesh, t as u32);
-            }
-        }
-        size
+    /// Triangles of one component that follow one another, with the number of the first; all of them, and all that
+    /// are in none, by ascending number.
+    pub fn runs(&self) -> impl Iterator<Item = (u32, Range<usize>)> {
+        self.of.chunk_by(|a, b| a == b).scan(0, |end, run| {
+            let start = *end;
+            *end += run.len();
+            Some((run[0], start..*end))
+        })
     }
 
     /// Which components hold one of these triangles.
@@ -101,15 +127,31 @@ impl Components {
             return vec![false; self.count()];
         }
         let mut bounds = vec![PlanBox::EMPTY; self.count()];
-        for (t, &part) in self.of.iter().enumerate() {
+        for (part, run) in self.runs() {
             if let Some(bounds) = bounds.get_mut(part as usize)
                 && asked(part as usize)
             {
-                mesh.corners(t as u32).into_iter().for_each(|p| bounds.include(p));
+                run.flat_map(|t| mesh.corners(t as u32)).for_each(|p| bounds.include(p));
             }
         }
         bounds.iter().map(|b| b.width_m() > width_m).collect()
     }
+}
+
+/// Joins the components of the triangles at three sides, as far as these have one, and gives their lowest triangle.
+fn join_sides(of: &mut [u32], sides: [u32; 3]) -> u32 {
+    let mut low = NONE;
+    for side in sides {
+        if of[side as usize] == NONE {
+            continue;
+        }
+        let other = root(of, side);
+        if low != NONE && low != other {
+            of[low.max(other) as usize] = low.min(other);
+        }
+        low = low.min(other);
+    }
+    low
 }
 
 /// The lowest triangle that the way of a triangle leads to. The way is shortened.

@@ -28,6 +28,13 @@ pub fn too_tall(mesh: &TileMesh, settings: &SegmentSettings) -> Vec<u32> {
     if most_m <= 0.0 {
         return Vec::new();
     }
+    let z = || mesh.positions.iter().map(|p| p.z);
+    let least = z().fold(f64::INFINITY, |least, z| if z < least { z } else { least });
+    let most = z().fold(f64::NEG_INFINITY, |most, z| if z > most { z } else { most });
+    if most - least <= most_m {
+        // Rounding keeps order: no triangle spans more than the tile.
+        return Vec::new();
+    }
     let tall = |t: &u32| {
         let z = mesh.triangles[*t as usize].map(|v| mesh.positions[v as usize].z);
         z[0].max(z[1]).max(z[2]) - z[0].min(z[1]).min(z[2]) > most_m
@@ -40,21 +47,22 @@ pub fn too_tall(mesh: &TileMesh, settings: &SegmentSettings) -> Vec<u32> {
 /// A component that reaches the halo's outer side is known to stay once what is seen of it is large
 /// enough; else it is unknown.
 pub fn give_back_dents(mesh: &TileMesh, adjacency: &Adjacency, sizes: &Sizes, state: &mut [State]) {
-    let concave = Components::of(adjacency, |t| state[t] == State::Removed);
+    let concave = Components::sized(mesh, adjacency, sizes, |t| state[t] == State::Removed);
     let open = concave.holding(adjacency.open());
     let becomes: Vec<State> = concave
-        .sizes(mesh, sizes)
-        .into_iter()
+        .size
+        .iter()
         .zip(open)
-        .map(|(size, open)| match (size < sizes.smallest, open) {
+        .map(|(&size, open)| match (size < sizes.smallest, open) {
             (false, _) => State::Removed,
             (true, true) => State::Unknown,
             (true, false) => State::Kept,
         })
         .collect();
-    for (state, &part) in state.iter_mut().zip(&concave.of) {
-        if let Some(&becomes) = becomes.get(part as usize) {
-            *state = becomes;
+    for (part, run) in concave.runs() {
+        match becomes.get(part as usize) {
+            None | Some(State::Removed) => {}
+            Some(becomes) => state[run].fill(*becomes),
         }
     }
 }

@@ -14,14 +14,18 @@ pub fn fill_holes(mesh: &TileMesh, adjacency: &Adjacency, settings: &SegmentSett
     let pockets = Components::of(adjacency, |t| labels.state[t] == State::Removed);
     let touching = contacts(mesh, labels);
     let mut contact = vec![NONE; pockets.count()];
-    for (corners, &pocket) in mesh.triangles.iter().zip(&pockets.of) {
-        if let Some(contact) = contact.get_mut(pocket as usize)
-            && *contact & !UNSURE != SEVERAL
-        {
+    for (pocket, run) in pockets.runs() {
+        let Some(contact) = contact.get_mut(pocket as usize) else { continue };
+        let mut all = *contact;
+        for corners in &mesh.triangles[run] {
+            if all & !UNSURE == SEVERAL {
+                break;
+            }
             for touching in corners.map(|v| touching[v as usize]).into_iter().filter(|&t| t != NONE) {
-                *contact = merge(*contact, touching);
+                all = merge(all, touching);
             }
         }
+        *contact = all;
     }
     drop(touching);
     let undecided = |pocket: usize| contact[pocket] & !UNSURE != SEVERAL && contact[pocket] & !UNSURE != OVERSIZE;
@@ -30,17 +34,17 @@ pub fn fill_holes(mesh: &TileMesh, adjacency: &Adjacency, settings: &SegmentSett
         let at_edge = pockets.holding(adjacency.at_mesh_edge());
         stays.iter_mut().zip(at_edge).for_each(|(stays, at_edge)| *stays |= at_edge);
     }
-    for (t, &pocket) in pockets.of.iter().enumerate() {
+    for (pocket, run) in pockets.runs() {
         let pocket = pocket as usize;
         if pocket >= stays.len() || stays[pocket] || !undecided(pocket) {
             continue;
         }
         // A pocket that the cut has opened, or beside something unknown, has vertices that are not sure.
         if contact[pocket] & UNSURE != 0 {
-            labels.state[t] = State::Unknown;
+            labels.state[run].fill(State::Unknown);
         } else if contact[pocket] != NONE {
-            labels.state[t] = State::Kept;
-            labels.label[t] = contact[pocket];
+            labels.state[run.clone()].fill(State::Kept);
+            labels.label[run].fill(contact[pocket]);
         }
     }
 }

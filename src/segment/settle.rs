@@ -76,7 +76,8 @@ pub fn oversize_pieces(mesh: &TileMesh, adjacency: &Adjacency, labels: &Labels) 
     let outside = |t: usize| of_body(t) && !mesh.in_core[t];
     let mut found = Oversize { unknown: unknown(&labels.state), ..Oversize::default() };
     found.unknown.retain(|&t| mesh.in_core[t as usize]);
-    if !(0..labels.label.len()).any(inside) {
+    let any_of = |block: &[u32]| block.iter().fold(false, |any, &label| any | (label == OVERSIZE));
+    if !labels.label.chunks(1024).any(any_of) {
         return found;
     }
     let bodies = Components::of(adjacency, of_body);
@@ -112,33 +113,33 @@ pub fn oversize_pieces(mesh: &TileMesh, adjacency: &Adjacency, labels: &Labels) 
 ///
 /// A grain is owned through its lowest triangle.
 pub fn settle(mesh: &TileMesh, adjacency: &Adjacency, sizes: &Sizes, labels: &Labels, oversize: Oversize) -> Settled {
-    let bodies = Components::of(adjacency, |t| labels.label[t] < OVERSIZE);
-    let size = bodies.sizes(mesh, sizes);
+    let bodies = Components::sized(mesh, adjacency, sizes, |t| labels.label[t] < OVERSIZE);
     let unknown = unknown(&labels.state);
     let open = bodies.holding(adjacency.open());
     let at_mesh_edge = bodies.holding(adjacency.at_mesh_edge());
     let doubtful = bodies.beside(adjacency, &unknown);
     let mut triangles = vec![0usize; bodies.count()];
-    for &part in bodies.of.iter().filter(|&&part| part != NONE) {
-        triangles[part as usize] += 1;
+    for (part, run) in bodies.runs().filter(|(part, _)| *part != NONE) {
+        triangles[part as usize] += run.len();
     }
     let owned = |part: usize| mesh.in_core[bodies.lowest[part] as usize];
     let closed = |part: usize| !open[part] && !doubtful[part];
     let mut grains: Vec<Option<Segment>> = (0..bodies.count())
         .map(|part| {
-            let publish = owned(part) && closed(part) && size[part] >= sizes.smallest;
+            let publish = owned(part) && closed(part) && bodies.size[part] >= sizes.smallest;
             let segment = |n| Segment { triangles: Vec::with_capacity(n), at_mesh_edge: at_mesh_edge[part] };
             publish.then(|| segment(triangles[part]))
         })
         .collect();
     let mut unsettled = oversize.unknown;
     unsettled.extend(unknown.into_iter().filter(|&t| mesh.in_core[t as usize]));
-    for (t, part) in bodies.of.iter().enumerate().filter(|(_, part)| **part != NONE) {
-        let part = *part as usize;
+    for (part, run) in bodies.runs().filter(|(part, _)| *part != NONE) {
+        let part = part as usize;
+        let run = run.start as u32..run.end as u32;
         if let Some(grain) = &mut grains[part] {
-            grain.triangles.push(t as u32);
-        } else if mesh.in_core[t] && owned(part) && !closed(part) {
-            unsettled.push(t as u32);
+            grain.triangles.extend(run);
+        } else if owned(part) && !closed(part) {
+            unsettled.extend(run.filter(|&t| mesh.in_core[t as usize]));
         }
     }
     unsettled.sort_unstable();

@@ -13,7 +13,15 @@ pub enum State {
 
 /// The triangles of unknown state, ascending.
 pub fn unknown(state: &[State]) -> Vec<u32> {
-    (0..state.len() as u32).filter(|&t| state[t as usize] == State::Unknown).collect()
+    const BLOCK: usize = 256;
+    let mut unknown = Vec::new();
+    for (block, first) in state.chunks(BLOCK).zip((0u32..).step_by(BLOCK)) {
+        // Most blocks hold none, which is told without a branch for each.
+        if block.iter().fold(false, |any, &s| any | (s == State::Unknown)) {
+            unknown.extend((first..).zip(block).filter(|(_, s)| **s == State::Unknown).map(|(t, _)| t));
+        }
+    }
+    unknown
 }
 
 /// No body. All labels are below 2^31, so that a vertex can carry one and [`UNSURE`] in one number.
