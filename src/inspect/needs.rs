@@ -25,7 +25,7 @@ impl Needs {
             least_memory_bytes: least_bytes(reach),
             whole_memory_bytes: whole_bytes(reach),
             memory_there_bytes,
-            disk_bytes: disk_bytes(reach.vertices(), reach.triangles(), reach.has_colors()),
+            disk_bytes: disk_bytes(reach.vertices(), reach.triangles(), reach.full_color()),
         }
     }
 }

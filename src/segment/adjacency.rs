@@ -1,16 +1,16 @@
 //! Which triangles lie side by side, found once per tile.
 
+use super::edges::{Bands, Sides, may_lack, real_corners};
 use crate::tile::TileMesh;
-
-/// Sorting pays above this many half-edges at one vertex: there is no limit to how many a broken mesh has.
-const FEW: usize = 24;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 /// The triangles of a mesh, side by side. Winding is ignored, and an edge with three or more triangles joins
 /// them all, as in the authors' program.
 pub struct Adjacency {
     /// For each triangle and side (corners 0 1, 1 2, 2 0) the one other triangle that lies there; the triangle
     /// itself where none does, or where the edge is a fork.
-    sides: Vec<[u32; 3]>,
+    sides: Vec<Sides>,
     /// Where the triangles of each fork begin, and the end of the last.
     fork_starts: Vec<u32>,
     fork_triangles: Vec<u32>,
@@ -18,64 +18,27 @@ pub struct Adjacency {
     at_mesh_edge: Vec<u32>,
 }
 
-/// A side of a triangle, kept with the lower of its vertices: the higher vertex above, 4 triangle + side below.
-#[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
-struct Half(u64);
-
-impl Half {
-    fn new(high: u32, triangle: usize, side: usize) -> Half {
-        Half(u64::from(high) << 32 | (triangle << 2 | side) as u64)
-    }
-
-    fn high(self) -> u32 {
-        (self.0 >> 32) as u32
-    }
-
-    fn triangle(self) -> u32 {
-        self.0 as u32 >> 2
-    }
-
-    fn side(self) -> usize {
-        self.0 as usize & 3
-    }
-}
-
 impl Adjacency {
-    /// Finds what lies side by side: half-edges are put beside the lower of their two vertices by counting, and
-    /// compared within these short lists.
+    /// Finds what lies side by side.
     pub fn of(mesh: &TileMesh) -> Adjacency {
-        let n = mesh.triangles.len();
-        // After the lists are filled, the one of vertex v ends at `end[v]`.
-        let mut end = vec![0u32; mesh.positions.len() + 1];
-        for &[a, b, c] in &mesh.triangles {
-            end[a.min(b) as usize + 1] += 1;
-            end[b.min(c) as usize + 1] += 1;
-            end[c.min(a) as usize + 1] += 1;
-        }
-        for v in 1..end.len() {
-            end[v] += end[v - 1];
-        }
-        let mut halves = vec![Half::default(); 3 * n];
-        for (t, &[a, b, c]) in mesh.triangles.iter().enumerate() {
-            for (side, [v, w]) in [[a, b], [b, c], [c, a]].into_iter().enumerate() {
-                let place = &mut end[v.min(w) as usize];
-                halves[*place as usize] = Half::new(v.max(w), t, side);
-                *place += 1;
-            }
-        }
+        let sides: Vec<Sides> = (0..mesh.triangles.len() as u32).map(|t| [t; 3].map(AtomicU32::new)).collect();
+        let bands = Bands::new(mesh);
+        let ends: Vec<_> = (0..bands.count()).into_par_iter().map(|band| bands.join(band, &sides)).collect();
         let mut adjacency = Adjacency {
-            sides: (0..n as u32).map(|t| [t; 3]).collect(),
+            sides,
             fork_starts: vec![0],
             fork_triangles: Vec::new(),
             open: Vec::new(),
             at_mesh_edge: Vec::new(),
         };
-        let mut first = 0;
-        for (low, &last) in (0..mesh.positions.len() as u32).zip(&end) {
-            adjacency.pair_up(mesh, low, &mut halves[first..last as usize]);
-            first = last as usize;
+        for ends in ends {
+            for fork in ends.forks {
+                adjacency.fork_triangles.extend(fork);
+                adjacency.fork_starts.push(adjacency.fork_triangles.len() as u32);
+            }
+            adjacency.open.extend(ends.open);
+            adjacency.at_mesh_edge.extend(ends.at_mesh_edge);
         }
-        drop(halves);
         adjacency.find_copies(mesh);
         for list in [&mut adjacency.open, &mut adjacency.at_mesh_edge] {
             list.sort_unstable();
@@ -84,101 +47,22 @@ impl Adjacency {
         adjacency
     }
 
-    /// Tells the edges at one vertex apart that lead to higher ones.
-    fn pair_up(&mut self, mesh: &TileMesh, low: u32, mut list: &mut [Half]) {
-        if list.len() > FEW {
-            list.sort_unstable();
-            for around in list.chunk_by(|a, b| a.high() == b.high()) {
-                self.join(mesh, low, around);
-            }
-            return;
-        }
-        let complete = mesh.complete[low as usize];
-        while let Some(&first) = list.first() {
-            // Without a branch for each: whether two lead to the same vertex is as good as random.
-            let (mut others, mut place) = (0, 0);
-            for (i, half) in list.iter().enumerate().skip(1) {
-                let same = half.high() == first.high();
-                others += usize::from(same);
-                place = if same { i } else { place };
-            }
-            match others {
-                0 => {}
-                1 => list.swap(1, place),
-                _ => list.sort_unstable_by_key(|h| (h.high() != first.high(), *h)),
-            }
-            let (around, rest) = list.split_at_mut(1 + others);
-            match *around {
-                [a, b] if complete && a.triangle() != b.triangle() => self.pair(a, b),
-                _ => self.join(mesh, low, around),
-            }
-            list = rest;
-        }
-    }
-
-    fn pair(&mut self, a: Half, b: Half) {
-        self.sides[a.triangle() as usize][a.side()] = b.triangle();
-        self.sides[b.triangle() as usize][b.side()] = a.triangle();
-    }
-
-    /// Notes what lies at one edge.
-    fn join(&mut self, mesh: &TileMesh, low: u32, around: &[Half]) {
-        let high = around[0].high();
-        let lone = match *around {
-            [_] => true,
-            [a, b] if a.triangle() != b.triangle() => {
-                self.pair(a, b);
-                // Unless one is a copy of the other, which is looked for at the end.
-                false
-            }
-            _ => {
-                self.join_many(around);
-                lone(mesh, around)
-            }
-        };
-        if may_lack(mesh, low, high) {
-            self.open.extend(around.iter().map(|h| h.triangle()));
-        } else if lone && low != high {
-            self.at_mesh_edge.extend(around.iter().map(|h| h.triangle()));
-        }
-    }
-
     /// Two copies of a face do not continue each other: the mesh ends where only they lie. They have three
     /// edges in common, so two sides have the same neighbour, or two edges are forks.
     fn find_copies(&mut self, mesh: &TileMesh) {
-        let mut suspects = self.fork_triangles.clone();
-        for (t, &[a, b, c]) in self.sides.iter().enumerate() {
-            let own = t as u32;
-            if (a == b && b != own) || (b == c && c != own) || (c == a && a != own) {
-                suspects.push(own);
-            }
-        }
+        let suspect = |own: &u32| {
+            let ([a, b, c], own) = (self.sides(*own as usize), *own);
+            (a == b && b != own) || (b == c && c != own) || (c == a && a != own)
+        };
+        let mut suspects: Vec<u32> = (0..self.len() as u32).into_par_iter().filter(suspect).collect();
+        suspects.extend(&self.fork_triangles);
         for t in suspects {
             let [a, b, c] = mesh.triangles[t as usize];
-            for (side, [v, w]) in self.sides[t as usize].into_iter().zip([[a, b], [b, c], [c, a]]) {
+            for (side, [v, w]) in self.sides(t as usize).into_iter().zip([[a, b], [b, c], [c, a]]) {
                 let both = [t, side].map(|t| real_corners(mesh, t));
                 if side != t && both[0].is_some() && both[0] == both[1] && !may_lack(mesh, v, w) {
                     self.at_mesh_edge.push(t);
                 }
-            }
-        }
-    }
-
-    /// A face that names a vertex twice lies at an edge twice, and is no fork by that.
-    fn join_many(&mut self, around: &[Half]) {
-        let mut triangles: Vec<u32> = around.iter().map(|h| h.triangle()).collect();
-        triangles.sort_unstable();
-        triangles.dedup();
-        match *triangles {
-            [_] => {}
-            [a, b] => {
-                for h in around {
-                    self.sides[h.triangle() as usize][h.side()] = if h.triangle() == a { b } else { a };
-                }
-            }
-            _ => {
-                self.fork_triangles.extend(triangles);
-                self.fork_starts.push(self.fork_triangles.len() as u32);
             }
         }
     }
@@ -195,7 +79,8 @@ impl Adjacency {
 
     /// What lies at the three sides of a triangle where no fork is: another triangle, or the triangle itself.
     pub fn sides(&self, triangle: usize) -> [u32; 3] {
-        self.sides[triangle]
+        let [a, b, c] = &self.sides[triangle];
+        [a, b, c].map(|side| side.load(Ordering::Relaxed))
     }
 
     /// Edges with more than two triangles: these, ascending, each once.
@@ -212,26 +97,6 @@ impl Adjacency {
     pub fn at_mesh_edge(&self) -> &[u32] {
         &self.at_mesh_edge
     }
-}
-
-/// Around a complete vertex everything is loaded, so an edge can only lack a triangle where both its ends are
-/// incomplete.
-fn may_lack(mesh: &TileMesh, v: u32, w: u32) -> bool {
-    !mesh.complete[v as usize] && !mesh.complete[w as usize]
-}
-
-/// The corners of a face, ascending; none if it names a vertex twice.
-fn real_corners(mesh: &TileMesh, triangle: u32) -> Option<[u32; 3]> {
-    let mut corners = mesh.triangles[triangle as usize];
-    corners.sort_unstable();
-    (corners[0] < corners[1] && corners[1] < corners[2]).then_some(corners)
-}
-
-/// Whether only one triangle lies at an edge. Faces that name a vertex twice, and copies of a face, do not
-/// count.
-fn lone(mesh: &TileMesh, around: &[Half]) -> bool {
-    let mut real = around.iter().filter_map(|h| real_corners(mesh, h.triangle()));
-    real.next().is_some_and(|first| real.all(|other| other == first))
 }
 
 #[cfg(test)]

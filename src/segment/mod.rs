@@ -23,6 +23,7 @@ pub mod adjacency;
 pub mod bodies;
 pub mod components;
 pub mod concave;
+mod edges;
 pub mod flat;
 pub mod holes;
 pub mod morphology;
