@@ -2,7 +2,7 @@
 
 use super::Sizes;
 use super::adjacency::Adjacency;
-use super::components::{Components, join_all, root};
+use super::components::{Components, Forest};
 use super::state::{Labels, NONE, OVERSIZE, State, unknown};
 use crate::settings::SegmentSettings;
 use crate::tile::TileMesh;
@@ -84,24 +84,26 @@ impl Possible {
     ) -> Possible {
         let kept = size.len();
         let mut parent: Vec<u32> = (0..(kept + unknown.len()) as u32).collect();
+        let mut forest = Forest { first: 0, parent: &mut parent };
         for (i, &t) in unknown.iter().enumerate() {
             node[t as usize] = (kept + i) as u32;
         }
         for &t in unknown {
             for side in adjacency.sides(t as usize).map(|s| node[s as usize]).into_iter().filter(|&s| s != NONE) {
-                join_all(&mut parent, [node[t as usize], side].into_iter());
+                forest.join(node[t as usize], side);
             }
         }
         for fork in adjacency.forks() {
-            join_all(&mut parent, fork.iter().map(|&t| node[t as usize]).filter(|&i| i != NONE));
+            forest.join_all(fork.iter().map(|&t| node[t as usize]).filter(|&i| i != NONE));
         }
         // Roots are the lowest of their nodes, so what a node adds goes to one that is summed already.
-        size.resize(parent.len(), 0);
-        open.resize(parent.len(), false);
+        let nodes = forest.parent.len();
+        size.resize(nodes, 0);
+        open.resize(nodes, false);
         adjacency.open().iter().map(|&t| node[t as usize]).filter(|&i| i != NONE).for_each(|i| open[i as usize] = true);
-        for i in 0..parent.len() {
-            let whole = root(&mut parent, i as u32) as usize;
-            parent[i] = whole as u32;
+        for i in 0..nodes {
+            let whole = forest.root(i as u32) as usize;
+            forest.parent[i] = whole as u32;
             open[whole] |= open[i];
             if i < kept && whole != i {
                 size[whole] = size[whole].saturating_add(size[i]);

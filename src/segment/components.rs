@@ -5,7 +5,12 @@ use super::adjacency::Adjacency;
 use super::state::NONE;
 use crate::geometry::PlanBox;
 use crate::tile::TileMesh;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::ops::Range;
+
+/// Triangles that one thread joins at a time.
+const BAND: usize = 1 << 17;
 
 /// A partition of the selected triangles into components, numbered by ascending lowest triangle.
 pub struct Components {
@@ -19,7 +24,7 @@ pub struct Components {
 
 impl Components {
     /// Components of the triangles for which `selected` holds.
-    pub fn of(adjacency: &Adjacency, selected: impl Fn(usize) -> bool) -> Components {
+    pub fn of(adjacency: &Adjacency, selected: impl Fn(usize) -> bool + Sync) -> Components {
         Components::at_least(adjacency, selected, 0, |_| 0)
     }
 
@@ -28,7 +33,7 @@ impl Components {
         mesh: &TileMesh,
         adjacency: &Adjacency,
         sizes: &Sizes,
-        selected: impl Fn(usize) -> bool,
+        selected: impl Fn(usize) -> bool + Sync,
     ) -> Components {
         Components::at_least(adjacency, selected, sizes.smallest, |t| sizes.of(mesh, t))
     }
@@ -36,46 +41,31 @@ impl Components {
     /// Components, each measured until it is known to be so large.
     fn at_least(
         adjacency: &Adjacency,
-        selected: impl Fn(usize) -> bool,
+        selected: impl Fn(usize) -> bool + Sync,
         enough: u64,
-        size_of: impl Fn(u32) -> u64,
+        size_of: impl Fn(u32) -> u64 + Sync,
     ) -> Components {
-        // First the way to a lower triangle of the same component, or to itself; `NONE` if not selected, or not
-        // yet looked at. `NONE` is above all of them.
-        let mut of = vec![NONE; adjacency.len()];
-        for t in (0..of.len()).filter(|&t| selected(t)) {
-            let sides = adjacency.sides(t);
-            let ways = sides.map(|side| of[side as usize]);
-            let low = ways[0].min(ways[1]).min(ways[2]);
-            if low == NONE {
-                of[t] = t as u32;
-                continue;
-            }
-            // Nearly always all lead to the lowest at once.
-            let one = ways.iter().fold(true, |one, &way| one & ((way == low) | (way == NONE)));
-            of[t] = if one && of[low as usize] == low { low } else { join_sides(&mut of, sides) };
-        }
+        // Bands of triangles by themselves, then what crosses their borders.
+        let mut parent = vec![NONE; adjacency.len()];
+        let crossings: Vec<Vec<[u32; 2]>> = parent
+            .par_chunks_mut(BAND)
+            .enumerate()
+            .map(|(band, parent)| Forest { first: band * BAND, parent }.grow(adjacency, &selected))
+            .collect();
+        let mut forest = Forest { first: 0, parent: &mut parent };
+        crossings.into_iter().flatten().for_each(|[a, b]| forest.join(a, b));
         for fork in adjacency.forks() {
-            join_all(&mut of, fork.iter().copied().filter(|&t| selected(t as usize)));
+            forest.join_all(fork.iter().copied().filter(|&t| selected(t as usize)));
         }
-        let (mut lowest, mut size) = (Vec::new(), Vec::new());
-        for t in 0..of.len() {
-            if of[t] == NONE {
-                continue;
-            }
-            if of[t] == t as u32 {
-                of[t] = lowest.len() as u32;
-                lowest.push(t as u32);
-                size.push(0);
-            } else {
-                // The way leads downward, where numbers of components stand already.
-                of[t] = of[of[t] as usize];
-            }
-            let size = &mut size[of[t] as usize];
-            if *size < enough {
-                *size += size_of(t as u32);
-            }
-        }
+        let lowest: Vec<u32> = (0..parent.len() as u32).into_par_iter().filter(|&t| parent[t as usize] == t).collect();
+        let mut of = vec![NONE; parent.len()];
+        let measured: Vec<BTreeMap<u32, u64>> = of
+            .par_chunks_mut(BAND)
+            .enumerate()
+            .map(|(band, of)| number(&parent, &lowest, BAND * band, of, (enough, &size_of)))
+            .collect();
+        let mut size = vec![0; lowest.len()];
+        measured.into_iter().flatten().for_each(|(part, in_band)| size[part as usize] += in_band);
         Components { of, lowest, size }
     }
 
@@ -138,39 +128,131 @@ impl Components {
     }
 }
 
-/// Joins the components of the triangles at three sides, as far as these have one, and gives their lowest triangle.
-fn join_sides(of: &mut [u32], sides: [u32; 3]) -> u32 {
-    let mut low = NONE;
-    for side in sides {
-        if of[side as usize] == NONE {
+/// Numbers the components of a band of triangles, and measures what of each lies in it.
+fn number(
+    parent: &[u32],
+    lowest: &[u32],
+    first: usize,
+    of: &mut [u32],
+    (enough, size_of): (u64, &impl Fn(u32) -> u64),
+) -> BTreeMap<u32, u64> {
+    let mut sizes = BTreeMap::new();
+    // The component of the last triangle, with its size so far.
+    let mut run = (NONE, 0);
+    let mut next = lowest.partition_point(|&t| (t as usize) < first);
+    for (place, t) in (first as u32..).take(of.len()).enumerate() {
+        let up = parent[t as usize];
+        if up == NONE {
             continue;
         }
-        let other = root(of, side);
-        if low != NONE && low != other {
-            of[low.max(other) as usize] = low.min(other);
+        let part = if up == t {
+            next += 1;
+            next as u32 - 1
+        } else if up as usize >= first {
+            // The way leads downward, where numbers of components stand already.
+            of[up as usize - first]
+        } else {
+            let mut low = up;
+            while parent[low as usize] != low {
+                low = parent[low as usize];
+            }
+            lowest.partition_point(|&t| t < low) as u32
+        };
+        of[place] = part;
+        if part != run.0 {
+            if run.0 != NONE {
+                sizes.insert(run.0, run.1);
+            }
+            run = (part, sizes.get(&part).copied().unwrap_or(0));
         }
-        low = low.min(other);
+        if run.1 < enough {
+            run.1 += size_of(t);
+        }
     }
-    low
+    if run.0 != NONE {
+        sizes.insert(run.0, run.1);
+    }
+    sizes
 }
 
-/// The lowest triangle that the way of a triangle leads to. The way is shortened.
-pub(super) fn root(parent: &mut [u32], mut t: u32) -> u32 {
-    while parent[t as usize] != t {
-        let up = parent[parent[t as usize] as usize];
-        parent[t as usize] = up;
-        t = up;
-    }
-    t
+/// Ways from triangles to lower ones of the same component: from the lowest to itself, [`NONE`] for a triangle that is
+/// not selected, or not yet looked at, which is above all of them.
+pub(super) struct Forest<'p> {
+    /// The triangle of the first way.
+    pub(super) first: usize,
+    /// The ways of the triangles from there on.
+    pub(super) parent: &'p mut [u32],
 }
 
-/// Joins all of these.
-pub(super) fn join_all(parent: &mut [u32], members: impl Iterator<Item = u32>) {
-    let mut last = None;
-    for t in members {
-        if let Some(other) = last.replace(t) {
-            let (a, b) = (root(parent, other), root(parent, t));
-            parent[a.max(b) as usize] = a.min(b);
+impl Forest<'_> {
+    /// Joins the selected triangles, as far as they are side by side within the forest. Those that lie beside lower ones
+    /// outside are returned with these.
+    fn grow(&mut self, adjacency: &Adjacency, selected: &impl Fn(usize) -> bool) -> Vec<[u32; 2]> {
+        let mut crossings = Vec::new();
+        for t in (self.first..self.first + self.parent.len()).filter(|&t| selected(t)) {
+            let sides = adjacency.sides(t);
+            let ways = sides.map(|side| self.way(side));
+            for side in sides {
+                if (side as usize) < self.first && selected(side as usize) {
+                    crossings.push([t as u32, side]);
+                }
+            }
+            let low = ways[0].min(ways[1]).min(ways[2]);
+            // Nearly always all lead to the lowest at once.
+            let one = ways.iter().fold(true, |one, &way| one & ((way == low) | (way == NONE)));
+            self.parent[t - self.first] = match low {
+                NONE => t as u32,
+                low if one && self.way(low) == low => low,
+                _ => self.join_sides(sides),
+            };
+        }
+        crossings
+    }
+
+    /// The way of a triangle; [`NONE`] also for those outside.
+    fn way(&self, t: u32) -> u32 {
+        self.parent.get((t as usize).wrapping_sub(self.first)).copied().unwrap_or(NONE)
+    }
+
+    /// Joins the components of the triangles at three sides, as far as these have one, and gives their lowest triangle.
+    fn join_sides(&mut self, sides: [u32; 3]) -> u32 {
+        let mut low = NONE;
+        for side in sides {
+            if self.way(side) == NONE {
+                continue;
+            }
+            let other = self.root(side);
+            if low != NONE && low != other {
+                self.parent[low.max(other) as usize - self.first] = low.min(other);
+            }
+            low = low.min(other);
+        }
+        low
+    }
+
+    /// The lowest triangle that the way of a triangle leads to. The way is shortened.
+    pub(super) fn root(&mut self, mut t: u32) -> u32 {
+        while self.parent[t as usize - self.first] != t {
+            let up = self.parent[self.parent[t as usize - self.first] as usize - self.first];
+            self.parent[t as usize - self.first] = up;
+            t = up;
+        }
+        t
+    }
+
+    /// Joins two triangles.
+    pub(super) fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.parent[a.max(b) as usize - self.first] = a.min(b);
+    }
+
+    /// Joins all of these.
+    pub(super) fn join_all(&mut self, members: impl Iterator<Item = u32>) {
+        let mut last = None;
+        for t in members {
+            if let Some(other) = last.replace(t) {
+                self.join(other, t);
+            }
         }
     }
 }
