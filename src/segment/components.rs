@@ -59,13 +59,17 @@ impl Components {
         }
         let lowest: Vec<u32> = (0..parent.len() as u32).into_par_iter().filter(|&t| parent[t as usize] == t).collect();
         let mut of = vec![NONE; parent.len()];
-        let measured: Vec<BTreeMap<u32, u64>> = of
+        let measured: Vec<InBand> = of
             .par_chunks_mut(BAND)
             .enumerate()
             .map(|(band, of)| number(&parent, &lowest, BAND * band, of, (enough, &size_of)))
             .collect();
         let mut size = vec![0; lowest.len()];
-        measured.into_iter().flatten().for_each(|(part, in_band)| size[part as usize] += in_band);
+        for in_band in measured {
+            let begun = size[in_band.first..].iter_mut().zip(in_band.begun);
+            begun.for_each(|(size, in_band)| *size += in_band);
+            in_band.earlier.into_iter().for_each(|(part, in_band)| size[part as usize] += in_band);
+        }
         Components { of, lowest, size }
     }
 
@@ -128,26 +132,43 @@ impl Components {
     }
 }
 
-/// Numbers the components of a band of triangles, and measures what of each lies in it.
+/// What of each component lies in a band of triangles.
+struct InBand {
+    /// Number of the first component that begins in the band.
+    first: usize,
+    /// Sizes of those that begin there.
+    begun: Vec<u64>,
+    /// Sizes of those that began before, by their numbers.
+    earlier: BTreeMap<u32, u64>,
+}
+
+impl InBand {
+    fn size(&mut self, part: u32) -> &mut u64 {
+        match (part as usize).checked_sub(self.first) {
+            Some(place) => &mut self.begun[place],
+            None => self.earlier.entry(part).or_default(),
+        }
+    }
+}
+
+/// Numbers the components of a band of triangles, and measures what of each lies in it, until that is enough.
 fn number(
     parent: &[u32],
     lowest: &[u32],
     first: usize,
     of: &mut [u32],
     (enough, size_of): (u64, &impl Fn(u32) -> u64),
-) -> BTreeMap<u32, u64> {
-    let mut sizes = BTreeMap::new();
-    // The component of the last triangle, with its size so far.
-    let mut run = (NONE, 0);
-    let mut next = lowest.partition_point(|&t| (t as usize) < first);
-    for (place, t) in (first as u32..).take(of.len()).enumerate() {
-        let up = parent[t as usize];
+) -> InBand {
+    let begin = lowest.partition_point(|&t| (t as usize) < first);
+    let mut sizes = InBand { first: begin, begun: Vec::new(), earlier: BTreeMap::new() };
+    for (place, &up) in parent[first..first + of.len()].iter().enumerate() {
         if up == NONE {
             continue;
         }
+        let t = (first + place) as u32;
         let part = if up == t {
-            next += 1;
-            next as u32 - 1
+            sizes.begun.push(0);
+            (begin + sizes.begun.len() - 1) as u32
         } else if up as usize >= first {
             // The way leads downward, where numbers of components stand already.
             of[up as usize - first]
@@ -159,18 +180,12 @@ fn number(
             lowest.partition_point(|&t| t < low) as u32
         };
         of[place] = part;
-        if part != run.0 {
-            if run.0 != NONE {
-                sizes.insert(run.0, run.1);
+        if enough > 0 {
+            let size = sizes.size(part);
+            if *size < enough {
+                *size += size_of(t);
             }
-            run = (part, sizes.get(&part).copied().unwrap_or(0));
         }
-        if run.1 < enough {
-            run.1 += size_of(t);
-        }
-    }
-    if run.0 != NONE {
-        sizes.insert(run.0, run.1);
     }
     sizes
 }
@@ -192,10 +207,9 @@ impl Forest<'_> {
         for t in (self.first..self.first + self.parent.len()).filter(|&t| selected(t)) {
             let sides = adjacency.sides(t);
             let ways = sides.map(|side| self.way(side));
-            for side in sides {
-                if (side as usize) < self.first && selected(side as usize) {
-                    crossings.push([t as u32, side]);
-                }
+            if (sides[0].min(sides[1]).min(sides[2]) as usize) < self.first {
+                let below = sides.into_iter().filter(|&s| (s as usize) < self.first && selected(s as usize));
+                crossings.extend(below.map(|side| [t as u32, side]));
             }
             let low = ways[0].min(ways[1]).min(ways[2]);
             // Nearly always all lead to the lowest at once.
