@@ -6,6 +6,7 @@ use super::components::Components;
 use super::state::State;
 use crate::settings::{ConcaveRule, SegmentSettings};
 use crate::tile::TileMesh;
+use rayon::prelude::*;
 
 /// Removes concave triangles: those whose divergence (the least of the three vertices, or their mean)
 /// lies below the threshold.
@@ -17,8 +18,8 @@ pub fn remove_concave(mesh: &TileMesh, divergence: &[f64], mean_edge_m: f64, set
     let state = |value: f64| if value < threshold { State::Removed } else { State::Kept };
     let of = |corners: &[u32; 3]| corners.map(|v| divergence[v as usize]);
     match settings.concave_rule {
-        ConcaveRule::Min => mesh.triangles.iter().map(of).map(|d| state(d[0].min(d[1]).min(d[2]))).collect(),
-        ConcaveRule::Mean => mesh.triangles.iter().map(of).map(|d| state((d[0] + d[1] + d[2]) / 3.0)).collect(),
+        ConcaveRule::Min => mesh.triangles.par_iter().map(of).map(|d| state(d[0].min(d[1]).min(d[2]))).collect(),
+        ConcaveRule::Mean => mesh.triangles.par_iter().map(of).map(|d| state((d[0] + d[1] + d[2]) / 3.0)).collect(),
     }
 }
 

@@ -7,6 +7,7 @@
 
 use super::state::{Labels, NONE, State, UNSURE};
 use crate::tile::TileMesh;
+use rayon::prelude::*;
 
 /// A removed triangle lies at the vertex.
 const AT_REMOVED: u8 = 1;
@@ -25,14 +26,14 @@ pub fn erode(mesh: &TileMesh, state: &mut [State]) {
         };
         corners.iter().for_each(|&v| seen[v as usize] |= mark);
     }
-    for (corners, s) in mesh.triangles.iter().zip(state).filter(|(_, s)| **s != State::Removed) {
+    mesh.triangles.par_iter().zip(state).filter(|(_, s)| **s != State::Removed).for_each(|(corners, s)| {
         let seen = corners.iter().fold(0, |all, &v| all | seen[v as usize]);
         if seen & AT_REMOVED != 0 {
             *s = State::Removed;
         } else if seen & DOUBTFUL != 0 {
             *s = State::Unknown;
         }
-    }
+    });
 }
 
 /// Gives one ring back: a free triangle next to one body joins it, unless its vertices go to another.

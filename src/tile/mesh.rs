@@ -45,6 +45,17 @@ pub enum Owned<'a> {
     Triangles(&'a [u64]),
 }
 
+/// Whether around each vertex of a patch there are as many corners as around it in the survey.
+fn complete(index: &Index, patch: &Patch) -> Result<Vec<bool>, StoreError> {
+    let mut valence = vec![0u16; patch.positions.len()];
+    for v in patch.corners.iter().flatten() {
+        let valence = &mut valence[*v as usize];
+        *valence = valence.saturating_add(1);
+    }
+    let whole = read_of(index.valences(), &patch.vertices)?;
+    Ok(valence.iter().zip(whole).map(|(&here, whole)| whole < MOST_COUNTED && here == whole).collect())
+}
+
 impl TileMesh {
     /// Loads a block of cells, of which some is owned.
     ///
@@ -57,15 +68,8 @@ impl TileMesh {
             "a tile of {count} triangles; at most {MOST_TRIANGLES} can be worked at once: set --max-grain or --tile-size",
         );
         let patch = Patch::load(index, block)?;
-        let mut valence = vec![0u16; patch.positions.len()];
-        for v in patch.corners.iter().flatten() {
-            let valence = &mut valence[*v as usize];
-            *valence = valence.saturating_add(1);
-        }
         let everything = patch.corners.len() as u64 == index.scale.triangles;
-        let whole = read_of(index.valences(), &patch.vertices)?;
-        let counted = valence.iter().zip(whole).map(|(&here, whole)| whole < MOST_COUNTED && here == whole);
-        let complete = counted.map(|counted| counted || everything).collect();
+        let complete = if everything { vec![true; patch.positions.len()] } else { complete(index, &patch)? };
         let mut in_core = vec![false; patch.corners.len()];
         match owned {
             Owned::Cells(core) => {
