@@ -1,9 +1,13 @@
 //! Inverse-distance weights that every instruction set computes alike, and sums that no order changes.
 //!
 //! A weight is 1 / max(distance, spacing). The reciprocal root is an integer guess whose error spans as little as it
-//! can (x y² within 9/8), a step of third order whose error is even (1.6e-5), and another one: 3e-15 relative. There
-//! are only products and fused products and sums, which IEEE 754 fixes to the bit: fused ones wherever it is written
-//! so, and nowhere else.
+//! can (x y² within 9/8), a step of third order whose error is even (1.6e-5), and another one: 3e-15 relative.
+//!
+//! All six squared distances come from one, |u|² + offset² -+ 2 offset u_i, which is off by at most a few times
+//! (1 + s)² + s² roundings for an offset of s spacings: 13 for the usual two.
+//!
+//! Everything is made of products, sums, differences and fused products, which IEEE 754 fixes to the bit: fused where
+//! it is written so, and nowhere else. Plain Rust calls a function for them where the processor is not known to fuse.
 //!
 //! Distances are in units of 2^50 times the spacing. So weights are 2^50 at the spacing, the largest they can be. They
 //! are rounded to integers by adding 1.5 * 2^52 (whose lowest bit is 1) and summed as integers: exact, so any order
@@ -50,13 +54,14 @@ impl Weighting {
         Weighting { offset_m, offset_m2: offset_m * offset_m, per_m2, twice_per_m: 2.0 * offset_m * per_m2 }
     }
 
-    /// |u|² + offset², of a centroid at `u` from the vertex, in metres.
+    /// |u|² + offset² of a centroid, which is `u` metres from the vertex: what its six squared distances have in common.
     #[inline(always)]
     pub(super) fn middle(&self, u: DVec3) -> f64 {
         u.x.mul_add(u.x, u.y.mul_add(u.y, u.z.mul_add(u.z, self.offset_m2))) * self.per_m2
     }
 
-    /// Squared distance from the stencil point on the positive side of an axis, or the negative one.
+    /// Squared distance from the stencil point on the positive or negative side of an axis, of a centroid that is
+    /// `along_m` from the vertex along it.
     #[inline(always)]
     pub(super) fn distance2(&self, middle: f64, along_m: f64, positive: bool) -> f64 {
         (if positive { -self.twice_per_m } else { self.twice_per_m }).mul_add(along_m, middle)
