@@ -126,27 +126,32 @@ fn clouds() -> Vec<Cloud> {
     all
 }
 
-/// The weight as the documentation of the kernel has it, in units of 2^-50 of the largest.
-fn weight(d2: f64, spacing_m: f64) -> f64 {
-    let x = if d2 > spacing_m * spacing_m { d2 } else { spacing_m * spacing_m };
-    let guess = f64::from_bits(0x5FE6_EB50_C7B5_37A9 - (x.to_bits() >> 1));
-    let y = guess * (1.5 * 1.000_876 - 0.5 * 1.000_876 * x * guess * guess);
-    let e = 1.0 - x * y * y;
-    let y = y * (spacing_m * 2f64.powi(50));
-    y + y * e * (0.5 + e * (0.375 + e * (0.3125 + e * 0.273_437_5)))
+/// The weight as the documentation of the kernel has it, of a squared distance in units of 2^50 times the spacing.
+fn weight(d2: f64) -> f64 {
+    let x = if d2 > 2f64.powi(-100) { d2 } else { 2f64.powi(-100) };
+    let guess = f64::from_bits(0x5FE3_F488_137B_DF99 - (x.to_bits() >> 1));
+    let t = x * guess * guess;
+    let polynomial = 0.669_317_201_101_195_5f64.mul_add(t, -1.770_729_842_481_61).mul_add(t, 2.106_247_710_098_045);
+    let y = guess * polynomial;
+    let e = (x * y).mul_add(-y, 1.0);
+    (y * e).mul_add(0.375f64.mul_add(e, 0.500_000_000_237_5), y)
 }
 
 /// The weighted mean of one component of the neighbours' normals.
 fn mean(field: &NormalField, found: impl Iterator<Item = usize>, p: DVec3, s: &Stencil, q: usize) -> f64 {
     let (mut weighted, mut weights) = (0i64, 0i64);
     let axis = q / 2;
+    let per_m2 = 2f64.powi(-100) / (s.spacing_m * s.spacing_m);
     for t in found {
         let u = field.centroids[t] - p;
-        let a = if q.is_multiple_of(2) { u[axis] - s.offset_m } else { u[axis] + s.offset_m };
-        let (b, c) = (u[(axis + 1) % 3], u[(axis + 2) % 3]);
-        let w = weight(a * a + (b * b + c * c), s.spacing_m);
-        weights += w.round_ties_even() as i64;
-        weighted += (w * field.normals[t][axis]).round_ties_even() as i64;
+        let middle = u.z.mul_add(u.z, s.offset_m * s.offset_m);
+        let middle = u.x.mul_add(u.x, u.y.mul_add(u.y, middle)) * per_m2;
+        let twice = 2.0 * s.offset_m * per_m2;
+        let w = weight(u[axis].mul_add(if q.is_multiple_of(2) { -twice } else { twice }, middle));
+        let normal = field.normals[t][axis];
+        let round = 1.5 * 2f64.powi(52);
+        weights += ((w + round) - round) as i64;
+        weighted += (w.mul_add(normal, round) - round) as i64;
     }
     weighted as f64 / weights as f64
 }

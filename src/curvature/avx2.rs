@@ -4,7 +4,7 @@
 
 use super::buffer::Points;
 use super::lanes::{IN_ORDER, Keys, Lanes, MOST, Near, Places, Row, fetch};
-use super::weights::{FIRST, GUESS, ROUND, SECOND, Sums, Weighting, surplus};
+use super::weights::{FIRST, GUESS, LEAST, ROUND, SECOND, Sums, Weighting, surplus};
 use super::{kernel, nearest};
 use crate::geometry::DVec3;
 use crate::tile::NormalField;
@@ -163,25 +163,22 @@ unsafe fn quarters(of: &[f32; 32], half: usize) -> [__m256; 2] {
     }
 }
 
-/// [`Weighting::weight`] of a² + rest.
+/// [`super::weights::weight`].
 ///
 /// SAFETY contract: the instructions are there.
 #[inline(always)]
-unsafe fn weight(a: __m256d, rest: __m256d, least: __m256d, scale: __m256d) -> __m256d {
+unsafe fn weight(d2: __m256d) -> __m256d {
     // SAFETY: the instructions are there by this function's contract.
     unsafe {
-        let d2 = _mm256_add_pd(_mm256_mul_pd(a, a), rest);
-        let x = _mm256_max_pd(d2, least);
+        let x = _mm256_max_pd(d2, _mm256_set1_pd(LEAST));
         let half = _mm256_srli_epi64::<1>(_mm256_castpd_si256(x));
         let guess = _mm256_castsi256_pd(_mm256_sub_epi64(_mm256_set1_epi64x(GUESS as i64), half));
-        let t = _mm256_mul_pd(_mm256_mul_pd(_mm256_mul_pd(_mm256_set1_pd(FIRST[1]), x), guess), guess);
-        let y = _mm256_mul_pd(guess, _mm256_sub_pd(_mm256_set1_pd(FIRST[0]), t));
-        let e = _mm256_sub_pd(_mm256_set1_pd(1.0), _mm256_mul_pd(_mm256_mul_pd(x, y), y));
-        let tail = _mm256_add_pd(_mm256_set1_pd(SECOND[2]), _mm256_mul_pd(e, _mm256_set1_pd(SECOND[3])));
-        let tail = _mm256_add_pd(_mm256_set1_pd(SECOND[1]), _mm256_mul_pd(e, tail));
-        let tail = _mm256_add_pd(_mm256_set1_pd(SECOND[0]), _mm256_mul_pd(e, tail));
-        let y = _mm256_mul_pd(y, scale);
-        _mm256_add_pd(y, _mm256_mul_pd(_mm256_mul_pd(y, e), tail))
+        let t = _mm256_mul_pd(_mm256_mul_pd(x, guess), guess);
+        let part = _mm256_fmadd_pd(_mm256_set1_pd(FIRST[2]), t, _mm256_set1_pd(FIRST[1]));
+        let y = _mm256_mul_pd(guess, _mm256_fmadd_pd(part, t, _mm256_set1_pd(FIRST[0])));
+        let e = _mm256_fnmadd_pd(_mm256_mul_pd(x, y), y, _mm256_set1_pd(1.0));
+        let part = _mm256_fmadd_pd(_mm256_set1_pd(SECOND[1]), e, _mm256_set1_pd(SECOND[0]));
+        _mm256_fmadd_pd(_mm256_mul_pd(y, e), part, y)
     }
 }
 
@@ -359,8 +356,8 @@ impl Lanes for Avx2 {
         // SAFETY: `self` proves that the instructions are there; `i` is below `near.len`, and `MOST` a multiple of the
         // lanes.
         unsafe {
-            let offset = _mm256_set1_pd(weighting.offset_m);
-            let (least, scale) = (_mm256_set1_pd(weighting.least_m2), _mm256_set1_pd(weighting.scale));
+            let (offset_m2, per_m2) = (_mm256_set1_pd(weighting.offset_m2), _mm256_set1_pd(weighting.per_m2));
+            let twice = _mm256_set1_pd(weighting.twice_per_m);
             let round = _mm256_set1_pd(ROUND);
             let surplus = surplus(near.len.next_multiple_of(4));
             // One axis at a time, since the registers hold no more.
@@ -368,18 +365,23 @@ impl Lanes for Avx2 {
                 let mut sums = [[_mm256_setzero_si256(); 2]; 2];
                 let mut i = 0;
                 while i < near.len {
-                    let u = load_f64(value, axis * MOST + i);
-                    let b = load_f64(value, (axis + 1) % 3 * MOST + i);
-                    let c = load_f64(value, (axis + 2) % 3 * MOST + i);
-                    let rest = _mm256_add_pd(_mm256_mul_pd(b, b), _mm256_mul_pd(c, c));
+                    let u = [0, 1, 2].map(|axis| load_f64(value, axis * MOST + i));
+                    let middle = u.iter().rev().fold(offset_m2, |sum, &u| _mm256_fmadd_pd(u, u, sum));
+                    let middle = _mm256_mul_pd(middle, per_m2);
+                    let u = u[axis];
                     let normal = load_f64(value, (3 + axis) * MOST + i);
                     let of = _mm256_cvtepu32_epi64(_mm_loadu_si128(near.of.as_ptr().add(i).cast()));
                     for side in 0..2 {
                         let bit = _mm256_set1_epi64x(1 << (near.shift + 2 * axis + side));
                         let belongs = _mm256_cmpeq_epi64(_mm256_and_si256(of, bit), bit);
-                        let a = if side == 0 { _mm256_sub_pd(u, offset) } else { _mm256_add_pd(u, offset) };
-                        let w = _mm256_and_pd(weight(a, rest, least, scale), _mm256_castsi256_pd(belongs));
-                        let weighted = _mm256_castpd_si256(_mm256_add_pd(_mm256_mul_pd(w, normal), round));
+                        let positive = side == 0;
+                        let d2 = if positive {
+                            _mm256_fnmadd_pd(twice, u, middle)
+                        } else {
+                            _mm256_fmadd_pd(twice, u, middle)
+                        };
+                        let w = _mm256_and_pd(weight(d2), _mm256_castsi256_pd(belongs));
+                        let weighted = _mm256_castpd_si256(_mm256_fmadd_pd(w, normal, round));
                         let weights = _mm256_castpd_si256(_mm256_add_pd(w, round));
                         let [sum_n, sum] = sums[side];
                         sums[side] = [_mm256_add_epi64(sum_n, weighted), _mm256_add_epi64(sum, weights)];

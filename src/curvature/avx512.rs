@@ -4,7 +4,7 @@
 
 use super::buffer::Points;
 use super::lanes::{Keys, Lanes, MOST, Near, Places, Row};
-use super::weights::{FIRST, GUESS, ROUND, SECOND, Sums, Weighting, surplus};
+use super::weights::{FIRST, GUESS, LEAST, ROUND, SECOND, Sums, Weighting, surplus};
 use super::{kernel, nearest};
 use crate::geometry::DVec3;
 use crate::tile::NormalField;
@@ -148,25 +148,22 @@ unsafe fn quarters(of: &[f32; 32]) -> [__m512; 2] {
     }
 }
 
-/// [`Weighting::weight`] of a² + rest, 0 for what does not belong.
+/// [`super::weights::weight`], 0 for what does not belong.
 ///
 /// SAFETY contract: the instructions are there.
 #[inline(always)]
-unsafe fn weight(belongs: __mmask8, a: __m512d, rest: __m512d, least: __m512d, scale: __m512d) -> __m512d {
+unsafe fn weight(belongs: __mmask8, d2: __m512d) -> __m512d {
     // SAFETY: the instructions are there by this function's contract.
     unsafe {
-        let d2 = _mm512_add_pd(_mm512_mul_pd(a, a), rest);
-        let x = _mm512_max_pd(d2, least);
+        let x = _mm512_max_pd(d2, _mm512_set1_pd(LEAST));
         let half = _mm512_srli_epi64::<1>(_mm512_castpd_si512(x));
         let guess = _mm512_castsi512_pd(_mm512_sub_epi64(_mm512_set1_epi64(GUESS as i64), half));
-        let t = _mm512_mul_pd(_mm512_mul_pd(_mm512_mul_pd(_mm512_set1_pd(FIRST[1]), x), guess), guess);
-        let y = _mm512_mul_pd(guess, _mm512_sub_pd(_mm512_set1_pd(FIRST[0]), t));
-        let e = _mm512_sub_pd(_mm512_set1_pd(1.0), _mm512_mul_pd(_mm512_mul_pd(x, y), y));
-        let tail = _mm512_add_pd(_mm512_set1_pd(SECOND[2]), _mm512_mul_pd(e, _mm512_set1_pd(SECOND[3])));
-        let tail = _mm512_add_pd(_mm512_set1_pd(SECOND[1]), _mm512_mul_pd(e, tail));
-        let tail = _mm512_add_pd(_mm512_set1_pd(SECOND[0]), _mm512_mul_pd(e, tail));
-        let y = _mm512_mul_pd(y, scale);
-        _mm512_maskz_add_pd(belongs, y, _mm512_mul_pd(_mm512_mul_pd(y, e), tail))
+        let t = _mm512_mul_pd(_mm512_mul_pd(x, guess), guess);
+        let part = _mm512_fmadd_pd(_mm512_set1_pd(FIRST[2]), t, _mm512_set1_pd(FIRST[1]));
+        let y = _mm512_mul_pd(guess, _mm512_fmadd_pd(part, t, _mm512_set1_pd(FIRST[0])));
+        let e = _mm512_fnmadd_pd(_mm512_mul_pd(x, y), y, _mm512_set1_pd(1.0));
+        let part = _mm512_fmadd_pd(_mm512_set1_pd(SECOND[1]), e, _mm512_set1_pd(SECOND[0]));
+        _mm512_maskz_fmadd_pd(belongs, _mm512_mul_pd(y, e), part, y)
     }
 }
 
@@ -331,8 +328,8 @@ impl Lanes for Avx512 {
         // numbers below `triangles` are gathered, and a `DVec3` is three `f64` in a row.
         unsafe {
             let vertex = vertex.to_array().map(|v| _mm512_set1_pd(v));
-            let offset = _mm512_set1_pd(weighting.offset_m);
-            let (least, scale) = (_mm512_set1_pd(weighting.least_m2), _mm512_set1_pd(weighting.scale));
+            let (offset_m2, per_m2) = (_mm512_set1_pd(weighting.offset_m2), _mm512_set1_pd(weighting.per_m2));
+            let twice = _mm512_set1_pd(weighting.twice_per_m);
             let round = _mm512_set1_pd(ROUND);
             let (centroids, normals) = (field.centroids.as_ptr().cast::<f64>(), field.normals.as_ptr().cast::<f64>());
             let (most, zero) = (_mm512_set1_epi64(triangles as i64), _mm512_setzero_pd());
@@ -349,14 +346,16 @@ impl Lanes for Avx512 {
                     normal[axis] = _mm512_mask_i64gather_pd::<8>(zero, known, at, normals.add(axis));
                     u[axis] = _mm512_sub_pd(place, vertex[axis]);
                 }
-                let (x2, y2, z2) = (_mm512_mul_pd(u[0], u[0]), _mm512_mul_pd(u[1], u[1]), _mm512_mul_pd(u[2], u[2]));
-                let rest = [_mm512_add_pd(y2, z2), _mm512_add_pd(z2, x2), _mm512_add_pd(x2, y2)];
+                let middle = u.iter().rev().fold(offset_m2, |sum, &u| _mm512_fmadd_pd(u, u, sum));
+                let middle = _mm512_mul_pd(middle, per_m2);
                 for q in 0..6 {
                     let u = u[q / 2];
                     let belongs = _mm512_test_epi64_mask(of, _mm512_set1_epi64(1 << (near.shift + q)));
-                    let a = if q % 2 == 0 { _mm512_sub_pd(u, offset) } else { _mm512_add_pd(u, offset) };
-                    let w = weight(belongs, a, rest[q / 2], least, scale);
-                    let part = _mm512_add_pd(_mm512_mul_pd(w, normal[q / 2]), round);
+                    let positive = q % 2 == 0;
+                    let d2 =
+                        if positive { _mm512_fnmadd_pd(twice, u, middle) } else { _mm512_fmadd_pd(twice, u, middle) };
+                    let w = weight(belongs, d2);
+                    let part = _mm512_fmadd_pd(w, normal[q / 2], round);
                     weighted[q] = _mm512_add_epi64(weighted[q], _mm512_castpd_si512(part));
                     weights[q] = _mm512_add_epi64(weights[q], _mm512_castpd_si512(_mm512_add_pd(w, round)));
                 }

@@ -5,7 +5,7 @@
 #![allow(clippy::needless_range_loop, reason = "stencil points and axes run through several arrays at once")]
 
 use super::buffer::{Aligned, Points, SLACK};
-use super::weights::{Sums, Weighting};
+use super::weights::{Sums, Weighting, weight};
 use crate::geometry::DVec3;
 use crate::tile::NormalField;
 
@@ -281,20 +281,15 @@ impl Lanes for Plain {
     fn sums(self, field: &NormalField, vertex: DVec3, near: &mut Near, weighting: &Weighting) -> Sums {
         fetch(field, vertex, near);
         let mut sums = Sums::default();
-        let value = |k: usize| &near.value[k * MOST..k * MOST + near.len];
-        for q in 0..6usize {
-            let side = if q.is_multiple_of(2) { weighting.offset_m } else { -weighting.offset_m };
-            let axis = q / 2;
-            let (a, b, c, n) = (value(axis), value((axis + 1) % 3), value((axis + 2) % 3), value(3 + axis));
-            let (mut weighted, mut weights) = (0i64, 0i64);
-            for i in 0..near.len {
-                let shifted = a[i] - side;
-                let weight = weighting.weight(shifted * shifted + (b[i] * b[i] + c[i] * c[i]));
-                let belongs = i64::from(near.of[i] >> (near.shift + q) & 1).wrapping_neg();
-                weights = weights.wrapping_add(super::weights::rounded(weight) & belongs);
-                weighted = weighted.wrapping_add(super::weights::rounded(weight * n[i]) & belongs);
+        let value = |k: usize, i: usize| near.value[k * MOST + i];
+        for (i, of) in near.of[..near.len].iter().enumerate() {
+            let u = DVec3::new(value(0, i), value(1, i), value(2, i));
+            let middle = weighting.middle(u);
+            // Fused products may be calls: not for what does not belong.
+            for q in (0..6).filter(|q| of >> (near.shift + q) & 1 == 1) {
+                let d2 = weighting.distance2(middle, u[q / 2], q.is_multiple_of(2));
+                sums.add(q, weight(d2), value(3 + q / 2, i));
             }
-            (sums.weighted[q], sums.weights[q]) = (weighted, weights);
         }
         sums
     }

@@ -5,7 +5,7 @@
 
 use super::Stencil;
 use super::kernel::stencil_point;
-use super::weights::{Sums, Weighting};
+use super::weights::{Sums, Weighting, weight};
 use crate::geometry::{DVec3, PlanBox};
 use crate::tile::NormalField;
 use std::sync::OnceLock;
@@ -60,11 +60,10 @@ impl<'a> Reserve<'a> {
         for q in 0..6 {
             let place = stencil_point(p, q, stencil.offset_m);
             certain &= self.search().nearest(place, stencil.neighbours, stencil.first_radius_m(), &mut found);
-            let side = if q.is_multiple_of(2) { 1.0 } else { -1.0 };
             for &(_, t) in &found {
                 let u = self.field.centroids[t as usize] - p;
-                let weight = weighting.weight(weighting.distance2(u, q / 2, side));
-                sums.add(q, weight, self.field.normals[t as usize][q / 2]);
+                let d2 = weighting.distance2(weighting.middle(u), u[q / 2], q.is_multiple_of(2));
+                sums.add(q, weight(d2), self.field.normals[t as usize][q / 2]);
             }
         }
         certain.then(|| sums.divergence(stencil.offset_m))
