@@ -13,6 +13,10 @@ const LEAST_BYTES: u64 = 16 << 20;
 /// Largest core of the curvature pass, triangles. With larger ones every tile takes new pages from the system; with
 /// smaller ones halos weigh more.
 const LARGEST_CURVATURE_CORE: f64 = 5e5;
+/// Largest core of the grain pass, triangles: what a crash can cost, and with its halos what local numbers can hold.
+const LARGEST_CORE: f64 = 5e7;
+/// Triangles of a core of the grain pass with its halos, for each of the core, where nothing is known of the grains.
+const WITH_WIDE_HALO: f64 = 1.6;
 /// Triangles of a curvature core with its halo, for each of the core.
 const WITH_HALO: f64 = 1.1;
 /// Widths of a grain that are worked once more along a border between two cores, halos and second looks together.
@@ -79,7 +83,7 @@ pub fn least_bytes(reach: &Reach) -> u64 {
 
 /// The memory with which a survey is worked in one piece, bytes.
 pub fn whole_bytes(reach: &Reach) -> u64 {
-    least_bytes(reach).max(fixed_bytes(reach) + TileMesh::footprint_bytes(reach.triangles()))
+    least_bytes(reach).max(fixed_bytes(reach) + TileMesh::footprint_bytes(reach.triangles().min(LARGEST_CORE as u64)))
 }
 
 /// Memory in which the index is built.
@@ -99,8 +103,8 @@ pub fn room(reach: &Reach, memory: u64) -> Result<BuildRoom, ForecastError> {
 ///
 /// # Errors
 /// The disk has less.
-pub fn disk(reach: &Reach, folder: &str, free: Option<u64>) -> Result<u64, ForecastError> {
-    let needed = disk_bytes(reach.vertices(), reach.triangles(), reach.full_color());
+pub fn disk(reach: &Reach, room: BuildRoom, folder: &str, free: Option<u64>) -> Result<u64, ForecastError> {
+    let needed = disk_bytes(reach.vertices(), reach.triangles(), reach.full_color(), room.bytes);
     match free {
         Some(free) if free < needed => Err(ForecastError::Disk { folder: folder.to_owned(), needed, free }),
         _ => Ok(needed),
@@ -133,16 +137,30 @@ pub fn grain_cores(index: &Index, settings: &Settings, threads: usize, memory: u
         return GrainCores { largest: CoreSize::square(index, settings.work.tile_size_m), divisible: false };
     }
     let triangles = index.scale.triangles;
-    let all = TileMesh::footprint_bytes(triangles) as f64;
-    // Halos of usual width, which no core has that is all.
-    let fits = |tiles: f64| {
-        let halo = if tiles > 1.0 { 1.3 } else { 1.0 };
-        all * halo / tiles * tiles.min(threads as f64) <= memory as f64
-    };
-    let least = (1..=threads).map(|tiles| tiles as f64).find(|&tiles| fits(tiles));
-    let least = least.unwrap_or(all * 1.3 * threads as f64 / memory as f64);
-    let largest = CoreSize::holding(index, triangles as f64 / least, threads);
-    GrainCores { largest, divisible: threads > 1 && triangles >= LEAST_TO_CUT && fits(threads as f64) }
+    let cuts = Cuts::of(triangles, threads, memory);
+    GrainCores { largest: CoreSize::holding(index, triangles as f64 / cuts.least, threads), divisible: cuts.divisible }
+}
+
+/// How often a survey is cut.
+#[derive(Debug, PartialEq)]
+struct Cuts {
+    /// The fewest tiles that memory allows; 1 for a survey that needs no cut.
+    least: f64,
+    /// Whether there may be more, for the sake of threads.
+    divisible: bool,
+}
+
+impl Cuts {
+    fn of(triangles: u64, threads: usize, memory: u64) -> Cuts {
+        let all = TileMesh::footprint_bytes(triangles) as f64 / memory as f64;
+        if all <= 1.0 && triangles as f64 <= LARGEST_CORE {
+            // Halos must fit as well if it is cut.
+            let divisible = threads > 1 && triangles >= LEAST_TO_CUT && all * WITH_WIDE_HALO <= 1.0;
+            return Cuts { least: 1.0, divisible };
+        }
+        let by_memory = all * WITH_WIDE_HALO * threads as f64;
+        Cuts { least: by_memory.max(triangles as f64 / LARGEST_CORE).max(2.0), divisible: false }
+    }
 }
 
 impl GrainCores {
@@ -172,4 +190,29 @@ pub fn tiles_bytes(survey: &Survey, settings: &Settings, threads: usize, memory:
         return Err(ForecastError::Memory { what: "the largest tile", needed: largest, memory, otherwise });
     }
     Ok((largest * threads.min(survey.plan.tiles.len()) as u64).min(memory))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GIB: u64 = 1 << 30;
+
+    #[test]
+    fn a_survey_is_cut_only_where_memory_or_the_cost_of_a_crash_asks_for_it() {
+        let cuts = |triangles: u64, threads, memory| Cuts::of(triangles, threads, memory);
+        assert_eq!(cuts(1_000_000, 2, GIB), Cuts { least: 1.0, divisible: false });
+        assert_eq!(cuts(10_000_000, 1, GIB), Cuts { least: 1.0, divisible: false });
+        assert_eq!(cuts(10_000_000, 2, 2 * GIB), Cuts { least: 1.0, divisible: true });
+        // Whole it fits, with halos it would not.
+        assert_eq!(cuts(14_000_000, 2, GIB), Cuts { least: 1.0, divisible: false });
+        assert_eq!(cuts(0, 8, GIB), Cuts { least: 1.0, divisible: false });
+        // However much memory there is, a tile's numbers and what a crash may cost are bounded.
+        assert_eq!(cuts(2_000_000_000, 1, 1000 * GIB).least, 40.0);
+        for (triangles, threads, memory) in [(100_000_000, 2, GIB), (100_000_000, 64, 8 * GIB), (15_000_000, 1, GIB)] {
+            let tile = triangles as f64 / cuts(triangles, threads, memory).least;
+            let bytes = TileMesh::footprint_bytes((tile * WITH_WIDE_HALO) as u64) * threads as u64;
+            assert!(bytes <= memory && !cuts(triangles, threads, memory).divisible, "{triangles}: {bytes} of {memory}");
+        }
+    }
 }

@@ -16,7 +16,7 @@ use crate::settings::{Instructions, Settings};
 use crate::statistics::RasterGrid;
 use crate::stitch::{Catalogue, TileReport, stitch};
 use crate::tile::Plan;
-use crate::write::{OutputFolder, Results, WholeMesh, WriteError, write_unnamed};
+use crate::write::{OutputFolder, REPORT, Results, WholeMesh, WriteError, write_unnamed};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -62,13 +62,14 @@ pub struct Outcome {
 /// # Errors
 /// An input cannot be read, or the results that are there are those of another run.
 pub fn is_done(job: &Job) -> Result<bool, Error> {
-    let report_is_there = || job.out.join("run.json").is_file();
-    if !job.resume || job.force || WorkFolder::holds_run(job.work.as_deref(), &job.out) || !report_is_there() {
+    let report = job.out.join(REPORT);
+    if !job.resume || job.force || WorkFolder::holds_run(job.work.as_deref(), &job.out) || !report.is_file() {
         return Ok(false);
     }
     job.settings.check()?;
-    let (reach, _) = Reach::open(&job.inputs, &job.settings.input, &|_, _| {})?;
-    match changes_since_finished(&job.out, &reach, &job.settings) {
+    let open = || Reach::open(&job.inputs, &job.settings.input, &|_, _| {});
+    let (reach, _) = pool(&job.settings)?.install(open)?;
+    match changes_since_finished(&report, &reach, &job.settings) {
         Some(changes) if changes.is_empty() => Ok(true),
         Some(changes) => Err(ResumeError::Finished { path: job.out.clone(), changes }.into()),
         None => Ok(false),
@@ -108,7 +109,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let mut index = match work.index(&reach)? {
         Some(index) => index,
         None => {
-            let disk = forecast::disk(&reach, &work.path().display().to_string(), work.free_bytes())?;
+            let disk = forecast::disk(&reach, room, &work.path().display().to_string(), work.free_bytes())?;
             progress.note(&format!("the index takes {} MiB in {}", disk >> 20, work.path().display()));
             make_index(&reach, &work, room, &crew, progress)?
         }
@@ -183,7 +184,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     facts["segmented_per_triangle"] = segmented_per_triangle.into();
     let curvature_per_triangle = (owned > 0).then(|| loaded as f64 / owned as f64);
     facts["curvature_per_triangle"] = curvature_per_triangle.into();
-    facts["identity"] = whole_identity(&reach, settings);
+    facts["identity"] = whole_identity(&reach, settings).into();
     let mesh = WholeMesh::new(&reach);
     let surveyed = index.triangles.occupied(&index.grid);
     let results = Results {

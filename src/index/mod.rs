@@ -243,14 +243,16 @@ impl Work<'_> {
 }
 
 /// Bytes that an index takes on disk, with the scratch files of its making, if none of them fits into memory, and the
-/// divergence of every vertex.
-pub fn disk_bytes(vertices: u64, triangles: u64, full_color: Option<f64>) -> u64 {
+/// divergence of every vertex. Where the new numbers of all vertices do not fit into the memory either, corners wait on
+/// disk as well.
+pub fn disk_bytes(vertices: u64, triangles: u64, full_color: Option<f64>, room_bytes: u64) -> u64 {
     let wide = vertices.max(triangles) > u64::from(u32::MAX);
     let number = if wide { 8 } else { 4 };
     let bytes = full_color.is_none_or(Colors::are_bytes);
     let waiting = 28 + number + if bytes { 3 } else { 12 };
     let colors = if full_color.is_none() { 0 } else { waiting - 28 - number };
-    let scratch = (vertices * waiting).max(triangles * 4 * number);
+    let corners = if room_bytes / 4 / number < vertices { 24 } else { 0 };
+    let scratch = (vertices * waiting).max(triangles * (4 * number + corners));
     vertices * (24 + 2 + 8 + number + colors) + triangles * 4 * number + scratch
 }
 

@@ -10,11 +10,11 @@ use serde::Serialize;
 pub struct Needs {
     /// The smallest memory budget that makes sense, bytes: what does not fit into it is worked in tiles.
     pub least_memory_bytes: u64,
-    /// Memory with which the survey is one tile, bytes: more is of no use.
+    /// Memory with which the survey is worked in one tile, or in the largest that there are, bytes.
     pub whole_memory_bytes: u64,
     /// Memory that is there, bytes, of which a run takes half unless it is told; none where the system does not tell.
     pub memory_there_bytes: Option<u64>,
-    /// Disk that the index takes, bytes.
+    /// Disk that the index takes, bytes; with very little memory about half as much again.
     pub disk_bytes: u64,
 }
 
@@ -25,7 +25,7 @@ impl Needs {
             least_memory_bytes: least_bytes(reach),
             whole_memory_bytes: whole_bytes(reach),
             memory_there_bytes,
-            disk_bytes: disk_bytes(reach.vertices(), reach.triangles(), reach.full_color()),
+            disk_bytes: disk_bytes(reach.vertices(), reach.triangles(), reach.full_color(), u64::MAX),
         }
     }
 }

@@ -31,8 +31,13 @@ impl Survey<'_> {
         let (cell, _) = self.index.triangles.cell_of(self.index.scale.triangles / 2);
         let [column, row] = self.index.grid.place(cell);
         let per_cell = self.index.scale.triangles as f64 / self.index.triangles.occupied_cells().max(1) as f64;
-        let half = ((TRIANGLES / per_cell).sqrt() / 2.0) as u32;
-        let block = self.index.grid.grown(&CellBlock { columns: column..column + 1, rows: row..row + 1 }, half);
+        let middle = CellBlock { columns: column..column + 1, rows: row..row + 1 };
+        let mut half = ((TRIANGLES / per_cell).sqrt() / 2.0) as u32;
+        // It may be denser there than elsewhere.
+        while half > 0 && self.triangles_in(&self.index.grid.grown(&middle, half)) as f64 > 2.0 * TRIANGLES {
+            half /= 2;
+        }
+        let block = self.index.grid.grown(&middle, half);
         let (mesh, found) = self.segmented(Owned::Cells(&block), &block, recipe)?;
         let width_m = |triangles: &[u32]| {
             let mut bounds = PlanBox::EMPTY;

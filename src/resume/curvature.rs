@@ -1,6 +1,6 @@
 //! Spacing and divergence on disk, with a record of which tiles are done.
 
-use super::recorded_core;
+use super::{record_core, recorded_core};
 use crate::index::Index;
 use crate::store::{Column, Ledger, Shelf, StoreError, fail_point};
 use crate::tile::{CoreSize, Plan};
@@ -43,7 +43,11 @@ impl Curvature {
     /// # Errors
     /// The disk says no.
     pub fn core(&mut self, size: CoreSize) -> Result<CoreSize, StoreError> {
-        recorded_core(&mut self.tiles, SIZE, size)
+        if let Some(recorded) = recorded_core(&self.tiles, SIZE)? {
+            return Ok(recorded);
+        }
+        record_core(&mut self.tiles, SIZE, size)?;
+        Ok(size)
     }
 
     /// The spacing, metres: the recorded one, or the one that `measure` finds, which is recorded.

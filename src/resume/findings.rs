@@ -1,6 +1,6 @@
 //! What tiles found, on disk until all are done: memory for tiles is free again when they are read.
 
-use super::recorded_core;
+use super::{record_core, recorded_core};
 use crate::error::Error;
 use crate::stitch::TileFinding;
 use crate::store::{Ledger, Shelf, StoreError};
@@ -14,19 +14,24 @@ const TILES: u64 = 1;
 #[derive(Debug)]
 pub struct Findings {
     ledger: Ledger,
+    /// The size of cores, until it is recorded with the first tile.
+    size: Option<CoreSize>,
 }
 
 impl Findings {
     pub(super) fn open(shelf: &Shelf, name: &str, identity: &str) -> Result<Findings, StoreError> {
-        Ok(Findings { ledger: shelf.ledger_of(name, identity)?.0 })
+        Ok(Findings { ledger: shelf.ledger_of(name, identity)?.0, size: None })
     }
 
-    /// The size of the cores whose records are here; otherwise `size`, which it is from now on.
+    /// The size of the cores whose records are here; otherwise `size`, which it is from the first record on: a run
+    /// that was ended because a tile was too large must not begin with that tile again.
     ///
     /// # Errors
     /// The disk says no.
     pub fn core(&mut self, size: CoreSize) -> Result<CoreSize, StoreError> {
-        recorded_core(&mut self.ledger, SIZE, size)
+        let recorded = recorded_core(&self.ledger, SIZE)?;
+        self.size = Some(size).filter(|_| recorded.is_none());
+        Ok(recorded.unwrap_or(size))
     }
 
     /// The tiles of the plan that have no finding, by their place in it.
@@ -40,6 +45,9 @@ impl Findings {
     /// # Errors
     /// The disk says no.
     pub fn add(&mut self, finding: &TileFinding) -> Result<(), Error> {
+        if let Some(size) = self.size.take() {
+            record_core(&mut self.ledger, SIZE, size)?;
+        }
         self.ledger.append(TILES + finding.report.tile, &finding.to_record()?)?;
         Ok(())
     }

@@ -63,11 +63,6 @@ impl Identity {
         }
     }
 
-    /// Names and values.
-    pub(super) fn value(self) -> Value {
-        Value::Object(self.0)
-    }
-
     /// As one line of text, the same for the same values.
     pub(super) fn text(&self) -> String {
         Value::Object(self.0.clone()).to_string()

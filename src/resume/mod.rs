@@ -262,15 +262,14 @@ fn place(named: Option<&Path>, out: &Path) -> PathBuf {
     named.map_or_else(|| out.join(WORK), Path::to_owned)
 }
 
-/// The size of cores that a ledger has under `key`, or `size`, which is then recorded: tiles that are done are
-/// tiles of that size.
-fn recorded_core(ledger: &mut Ledger, key: u64, size: CoreSize) -> Result<CoreSize, StoreError> {
-    if let Some(position) = ledger.position(key)
-        && let Ok([a, b, c, d, e, f, g, h]) = <[u8; 8]>::try_from(ledger.read(position)?.payload)
-    {
-        let (columns, rows) = (u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h]));
-        return Ok(CoreSize { columns, rows });
-    }
-    ledger.append(key, &[size.columns.to_le_bytes(), size.rows.to_le_bytes()].concat())?;
-    Ok(size)
+/// The size of cores that a ledger has under `key`: tiles that are done are tiles of that size.
+fn recorded_core(ledger: &Ledger, key: u64) -> Result<Option<CoreSize>, StoreError> {
+    let Some(position) = ledger.position(key) else { return Ok(None) };
+    let Ok([a, b, c, d, e, f, g, h]) = <[u8; 8]>::try_from(ledger.read(position)?.payload) else { return Ok(None) };
+    let (columns, rows) = (u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h]));
+    Ok(Some(CoreSize { columns, rows }))
+}
+
+fn record_core(ledger: &mut Ledger, key: u64, size: CoreSize) -> Result<(), StoreError> {
+    ledger.append(key, &[size.columns.to_le_bytes(), size.rows.to_le_bytes()].concat()).map(|_| ())
 }

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// Triangles that one thread joins at a time.
-const BAND: usize = 1 << 17;
+const BAND: usize = if cfg!(test) { 5 } else { 1 << 17 };
 
 /// A partition of the selected triangles into components, numbered by ascending lowest triangle.
 pub struct Components {
@@ -268,5 +268,66 @@ impl Forest<'_> {
                 self.join(other, t);
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::DVec3;
+
+    /// Components by spreading from each triangle that has none yet.
+    fn plainly(adjacency: &Adjacency, selected: &[bool]) -> (Vec<u32>, Vec<u32>) {
+        let (mut of, mut lowest) = (vec![NONE; selected.len()], Vec::new());
+        for t in (0..selected.len()).filter(|&t| selected[t]) {
+            if of[t] != NONE {
+                continue;
+            }
+            let mut spread = vec![t as u32];
+            while let Some(at) = spread.pop() {
+                if !selected[at as usize] || of[at as usize] != NONE {
+                    continue;
+                }
+                of[at as usize] = lowest.len() as u32;
+                spread.extend(adjacency.sides(at as usize));
+                adjacency.forks().filter(|f| f.contains(&at)).for_each(|f| spread.extend(f));
+            }
+            lowest.push(t as u32);
+        }
+        (of, lowest)
+    }
+
+    /// Heaps of faces, in which components wind through many bands and are joined by forks.
+    #[test]
+    fn components_are_those_of_a_flood_whatever_bands_they_cross() {
+        let mut seed = 3u64;
+        let mut below = |n: u64| {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 33) % n
+        };
+        let (mut crossing, mut forks) = (0, 0);
+        for _ in 0..2000 {
+            let (vertices, faces) = (3 + below(40), below(60));
+            let mesh = TileMesh {
+                triangles: (0..faces).map(|_| [0; 3].map(|_| below(vertices) as u32)).collect(),
+                complete: vec![true; vertices as usize],
+                positions: vec![DVec3::ZERO; vertices as usize],
+                ..TileMesh::default()
+            };
+            let adjacency = Adjacency::of(&mesh);
+            let selected: Vec<bool> = (0..faces).map(|_| below(5) > 0).collect();
+            let enough = below(6);
+            let found = Components::at_least(&adjacency, |t| selected[t], enough, |t| u64::from(t % 3));
+            let (of, lowest) = plainly(&adjacency, &selected);
+            assert_eq!((&found.of, &found.lowest), (&of, &lowest));
+            for (part, &size) in found.size.iter().enumerate() {
+                let members = (0..of.len()).filter(|&t| of[t] == part as u32);
+                let whole: u64 = members.clone().map(|t| t as u64 % 3).sum();
+                assert!(size == whole || (size >= enough && size <= whole), "{size} of {whole}, {enough} is enough");
+                crossing += usize::from(members.max().is_some_and(|t| t / BAND > lowest[part] as usize / BAND));
+            }
+            forks += adjacency.forks().count();
+        }
+        assert!(crossing > 1000 && forks > 1000, "{crossing} crossing bands, {forks} forks");
     }
 }

@@ -7,9 +7,9 @@ use std::sync::atomic::{AtomicU32, Ordering};
 /// Sorting pays above this many half-edges at one vertex: there is no limit to how many a broken mesh has.
 const FEW: usize = 24;
 /// Vertices of a band: its half-edges stay in the processor's cache.
-const BAND: usize = 1 << 15;
+const BAND: usize = if cfg!(test) { 4 } else { 1 << 15 };
 /// Triangles that are passed over at once where none of them has an edge in a band.
-const BLOCK: usize = 1 << 11;
+const BLOCK: usize = if cfg!(test) { 3 } else { 1 << 11 };
 
 /// What lies at the three sides of a triangle. Every band of vertices writes to sides of its own.
 pub(super) type Sides = [AtomicU32; 3];

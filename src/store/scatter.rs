@@ -10,10 +10,10 @@ use std::sync::{Mutex, PoisonError};
 
 /// Bytes that a writer gathers for a bucket before it hands them on: fewer where there are many buckets.
 const BLOCK_BYTES: usize = 64 << 10;
-/// Bytes that a writer gathers for all buckets together, at most about.
-const WRITER_BYTES: usize = 16 << 20;
+/// Part of the room that all writers together may take while they gather.
+const WRITERS_SHARE: u64 = 4;
 /// Bytes of a block, at least: the disk should not have to look for much less.
-const LEAST_BLOCK_BYTES: usize = 8 << 10;
+const LEAST_BLOCK_BYTES: usize = 2 << 10;
 
 /// Buckets of records. What does not stay in memory is in one scratch file, which goes when this goes.
 #[derive(Debug)]
@@ -48,12 +48,13 @@ impl<R: Element> Scatter<R> {
     /// The scratch file cannot be made.
     pub fn new(shelf: &Shelf, name: &str, buckets: usize, room: u64) -> Result<Scatter<R>, StoreError> {
         let (file, path) = shelf.scratch(name)?;
-        let block = (WRITER_BYTES / buckets.max(1)).clamp(LEAST_BLOCK_BYTES, BLOCK_BYTES);
+        let of_writer = room / WRITERS_SHARE / rayon::current_num_threads() as u64;
+        let block = (of_writer as usize / buckets.max(1)).clamp(LEAST_BLOCK_BYTES, BLOCK_BYTES);
         Ok(Scatter {
             file: Positioned::new(file),
             path,
             end: AtomicU64::new(0),
-            room: AtomicU64::new(room),
+            room: AtomicU64::new(room - room / WRITERS_SHARE),
             block_records: (block / size_of::<R>()).max(1),
             buckets: (0..buckets).map(|_| Mutex::default()).collect(),
         })

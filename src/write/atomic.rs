@@ -9,9 +9,12 @@ use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+/// The report of a run, the last file to get its name: where it is, all results are there.
+pub const REPORT: &str = "run.json";
+
 /// Names of all files that a run may write, in the order in which they get their final names.
 pub const OUTPUTS: [&str; 6] =
-    ["grains.gpkg", "grains.csv", "grain_size.tif", "labelled_mesh.ply", "summary.json", "run.json"];
+    ["grains.gpkg", "grains.csv", "grain_size.tif", "labelled_mesh.ply", "summary.json", REPORT];
 
 /// What GDAL and SQLite may leave beside a file that they did not finish.
 const SIDECARS: [&str; 6] = ["-journal", "-wal", "-shm", ".aux.xml", ".msk.ovr.tmp", ".ovr.tmp"];
@@ -107,12 +110,14 @@ impl OutputFolder {
     /// where it is, what lies beside it belongs to it.
     pub(crate) fn publish(&self, pending: Vec<Pending>) -> Result<Vec<PathBuf>, WriteError> {
         fail_point("results.before_names");
-        let report = self.path.join(OUTPUTS[OUTPUTS.len() - 1]);
+        let report = self.path.join(REPORT);
         match fs::remove_file(&report) {
             Err(source) if source.kind() != io::ErrorKind::NotFound => {
                 return Err(WriteError::File { path: report, action: "remove the report of an earlier run", source });
             }
-            _ => {}
+            Err(_) => {}
+            // On the disk, before anything else changes there.
+            Ok(()) => self.sync()?,
         }
         let mut published = Vec::with_capacity(pending.len());
         for file in pending {
@@ -138,12 +143,16 @@ impl OutputFolder {
                 })?;
             }
         }
+        self.sync()?;
+        Ok(published)
+    }
+
+    fn sync(&self) -> Result<(), WriteError> {
         sync_folder(&self.path).map_err(|source| WriteError::Folder {
             path: self.path.clone(),
             action: "flush the output folder to the disk",
             source,
-        })?;
-        Ok(published)
+        })
     }
 }
 

@@ -24,7 +24,7 @@ mod layers;
 mod source;
 mod wkb;
 
-pub use atomic::{OUTPUTS, OutputFolder};
+pub use atomic::{OUTPUTS, OutputFolder, REPORT};
 pub use error::WriteError;
 pub use labelled_mesh::MeshSource;
 pub use source::WholeMesh;
