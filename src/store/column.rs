@@ -306,7 +306,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let column = Column::<[u32; 3]>::create(&folder.path().join("column"), 90_000).unwrap();
         let mut writer = column.writer(5);
-        (0..80_000).for_each(|i| writer.put([i, i * i, 7]).unwrap());
+        (0..80_000u32).for_each(|i| writer.put([i, i.wrapping_mul(i), 7]).unwrap());
         let checksum = writer.finish().unwrap();
         assert_eq!(column.checksum(5..80_005).unwrap(), checksum);
         assert_ne!(column.checksum(6..80_006).unwrap(), checksum);
