@@ -1,10 +1,11 @@
 //! What a run will take: how the survey is cut, and how much memory and disk that needs.
 
+use crate::curvature::InstructionSet;
 use crate::index::{BuildRoom, Index, disk_bytes};
 use crate::open::Reach;
 use crate::passes::Survey;
 use crate::settings::Settings;
-use crate::tile::{CoreSize, NormalField, TileMesh};
+use crate::tile::{CoreSize, NormalField, Plan, TileMesh};
 
 /// Memory of the program itself, of GDAL and of buffers, bytes.
 const BASE_BYTES: u64 = 64 << 20;
@@ -137,8 +138,18 @@ pub fn grain_cores(index: &Index, settings: &Settings, threads: usize, memory: u
         return GrainCores { largest: CoreSize::square(index, settings.work.tile_size_m), divisible: false };
     }
     let triangles = index.scale.triangles;
-    let cuts = Cuts::of(triangles, threads, memory);
-    GrainCores { largest: CoreSize::holding(index, triangles as f64 / cuts.least, threads), divisible: cuts.divisible }
+    let Cuts { mut least, divisible } = Cuts::of(triangles, threads, memory);
+    loop {
+        let largest = CoreSize::holding(index, triangles as f64 / least, threads);
+        let plan = Plan::new(index, largest);
+        let survey = Survey { index, plan: &plan, instructions: InstructionSet::best() };
+        // The halos of small cores are wider than the rest of them.
+        let fits = survey.largest_bytes(&settings.segment) <= memory;
+        if fits || least == 1.0 || (largest.columns, largest.rows) == (1, 1) {
+            return GrainCores { largest, divisible };
+        }
+        least *= 1.3;
+    }
 }
 
 /// How often a survey is cut.
@@ -181,13 +192,20 @@ impl GrainCores {
 
 /// What the tiles in flight take at most, bytes, if none has to look further than usual.
 ///
+/// Beside them, `fixed` bytes are taken by what is no tile.
+///
 /// # Errors
 /// One of them alone takes more than `memory`.
-pub fn tiles_bytes(survey: &Survey, settings: &Settings, threads: usize, memory: u64) -> Result<u64, ForecastError> {
+pub fn tiles_bytes(
+    survey: &Survey,
+    settings: &Settings,
+    threads: usize,
+    (memory, fixed): (u64, u64),
+) -> Result<u64, ForecastError> {
     let largest = survey.largest_bytes(&settings.segment);
     if largest > memory {
-        let otherwise = "a smaller --tile-size";
-        return Err(ForecastError::Memory { what: "the largest tile", needed: largest, memory, otherwise });
+        let (what, otherwise) = ("the run, with its largest tile,", "a smaller --tile-size");
+        return Err(ForecastError::Memory { what, needed: largest + fixed, memory: memory + fixed, otherwise });
     }
     Ok((largest * threads.min(survey.plan.tiles.len()) as u64).min(memory))
 }

@@ -69,7 +69,7 @@ pub fn is_done(job: &Job) -> Result<bool, Error> {
     job.settings.check()?;
     let open = || Reach::open(&job.inputs, &job.settings.input, &|_, _| {});
     let (reach, _) = pool(&job.settings)?.install(open)?;
-    match changes_since_finished(&report, &reach, &job.settings) {
+    match changes_since_finished(&job.out, REPORT, &reach, &job.settings) {
         Some(changes) if changes.is_empty() => Ok(true),
         Some(changes) => Err(ResumeError::Finished { path: job.out.clone(), changes }.into()),
         None => Ok(false),
@@ -121,10 +121,11 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let mut curvature = work.curvature(&reach, &index, settings)?;
     let core = forecast::curvature_core(&index, settings, threads, room.bytes);
     let vertex_plan = Plan::new(&index, curvature.core(core)?);
+    let budget = (room.bytes, forecast::fixed_bytes(&reach));
     let cores = forecast::grain_cores(&index, settings, threads, room.bytes);
     let plan = Plan::new(&index, cores.largest);
     let tiles_bytes =
-        forecast::tiles_bytes(&Survey { index: &index, plan: &plan, instructions }, settings, threads, room.bytes)?;
+        forecast::tiles_bytes(&Survey { index: &index, plan: &plan, instructions }, settings, threads, budget)?;
     progress.note(&format!(
         "{} tiles{} of {:.3} x {:.3} m, {threads} threads; peak memory about {} MiB of {} MiB",
         plan.tiles.len(),

@@ -109,7 +109,9 @@ fn another(section: &str, key: &str, value: &toml::Value) -> toml::Value {
         toml::Value::Integer(i) => vec![(i + 1).into()],
         toml::Value::Float(f) => vec![(f + 0.3).into()],
         toml::Value::Array(a) => vec![toml::Value::Array(vec![1.5.into(); a.len()])],
-        _ => ["mm", "triangle-count", "mean", "3GiB", "EPSG:2193"].into_iter().map(toml::Value::from).collect(),
+        _ => {
+            ["mm", "triangle-count", "mean", "3GiB", "EPSG:2193", "scalar"].into_iter().map(toml::Value::from).collect()
+        }
     };
     let accepted = |v: &toml::Value| v != value && Settings::load(None, &[format!("{section}.{key}={v}")]).is_ok();
     candidates.into_iter().find(accepted).unwrap_or_else(|| panic!("{section}.{key}: no other value is accepted"))

@@ -331,6 +331,10 @@ fn results_that_are_there_are_not_replaced_where_there_is_nothing_to_resume() {
         said(&mut scene.run(&out, &["--resume", change])).fails(2, &["is done, and was another one", name, "--force"]);
     }
     said(&mut scene.run(&out, &[])).fails(1, &["holds files already", "--force"]);
+    // Where a result is gone the run is not done.
+    std::fs::rename(out.join("grains.gpkg"), scene.path("grains.gpkg")).unwrap();
+    said(&mut scene.run(&out, &["--resume"])).fails(1, &["holds files already", "--force"]);
+    std::fs::rename(scene.path("grains.gpkg"), out.join("grains.gpkg")).unwrap();
     // Without a report nobody knows what the other results are.
     std::fs::rename(out.join("run.json"), scene.path("run.json")).unwrap();
     said(&mut scene.run(&out, &["--resume"])).fails(1, &["holds files already", "--force"]);
