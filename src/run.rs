@@ -165,7 +165,8 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let recipe = Recipe { usual_width_m: probe.usual_width_m, ..recipe };
     let plan = Plan::new(&index, findings.core(cores.size(&index, threads, probe.usual_width_m))?);
     let survey = Survey { index: &index, plan: &plan, instructions };
-
+    // An interrupted run may have had more memory, and larger tiles.
+    forecast::tiles_bytes(&survey, settings, threads, budget)?;
     let jobs = findings.missing(&plan);
     if jobs.len() < plan.tiles.len() {
         progress.note(&format!("{} of {} tiles are done already", plan.tiles.len() - jobs.len(), plan.tiles.len()));

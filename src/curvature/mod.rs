@@ -92,7 +92,6 @@ pub fn nearest_centroid_m(field: &NormalField, points: &[DVec3], side_m: f64) ->
 }
 
 /// [`nearest_centroid_m`] with a certain instruction set, which must be available.
-#[doc(hidden)]
 pub fn nearest_centroid_m_with(
     field: &NormalField,
     points: &[DVec3],
@@ -115,7 +114,6 @@ pub fn divergence(field: &NormalField, points: &[DVec3], stencil: &Stencil) -> V
 }
 
 /// [`divergence`] with a certain instruction set, which must be available.
-#[doc(hidden)]
 pub fn divergence_with(
     field: &NormalField,
     points: &[DVec3],
