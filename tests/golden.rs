@@ -10,6 +10,7 @@ use gravelometer::index::{Index, Scale};
 use gravelometer::measure::{Wanted, measure};
 use gravelometer::open::MemorySurface;
 use gravelometer::segment::adjacency::Adjacency;
+use gravelometer::segment::bands::Bands;
 use gravelometer::segment::state::State;
 use gravelometer::segment::{Segment, Step, segment};
 use gravelometer::settings::Settings;
@@ -220,7 +221,7 @@ fn a_bed_with_overhangs_is_segmented_as_by_the_authors() {
 fn in_a_golden_mesh_every_triangle_is_beside_its_neighbours_and_they_beside_it() {
     let Some(g) = golden("bed_0.3M") else { return };
     let mesh = whole(&g);
-    let adjacency = Adjacency::of(&mesh);
+    let adjacency = Adjacency::of(&Bands::of(&mesh));
     assert_eq!((adjacency.len() as u64, adjacency.forks().count()), (g.tri_seg.len() as u64, 0));
     assert!(adjacency.open().is_empty());
     let mut edges = BTreeMap::<[u32; 2], Vec<u32>>::new();

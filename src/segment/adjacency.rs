@@ -1,6 +1,7 @@
 //! Which triangles lie side by side, found once per tile.
 
-use super::edges::{Bands, Sides, may_lack, real_corners};
+use super::bands::Bands;
+use super::edges::{self, Sides, may_lack, real_corners};
 use crate::tile::TileMesh;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -20,10 +21,12 @@ pub struct Adjacency {
 
 impl Adjacency {
     /// Finds what lies side by side.
-    pub fn of(mesh: &TileMesh) -> Adjacency {
-        let sides: Vec<Sides> = (0..mesh.triangles.len() as u32).map(|t| [t; 3].map(AtomicU32::new)).collect();
-        let bands = Bands::new(mesh);
-        let ends: Vec<_> = (0..bands.count()).into_par_iter().map(|band| bands.join(band, &sides)).collect();
+    pub fn of(bands: &Bands) -> Adjacency {
+        let mesh = bands.mesh;
+        let alone = |t| [t; 3].map(AtomicU32::new);
+        let sides: Vec<Sides> = (0..mesh.triangles.len() as u32).into_par_iter().map(alone).collect();
+        let ends: Vec<_> =
+            (0..edges::count(mesh)).into_par_iter().map(|band| edges::join(bands, band, &sides)).collect();
         let mut adjacency = Adjacency {
             sides,
             fork_starts: vec![0],
@@ -115,7 +118,10 @@ mod tests {
 
     #[test]
     fn an_edge_knows_all_its_triangles_whatever_their_winding() {
-        let adjacency = Adjacency::of(&mesh(&[[0, 1, 2], [2, 1, 3], [1, 2, 4], [0, 0, 3], [3, 4, 1]], &[true; 5]));
+        let adjacency = Adjacency::of(&Bands::of(&mesh(
+            &[[0, 1, 2], [2, 1, 3], [1, 2, 4], [0, 0, 3], [3, 4, 1]],
+            &[true; 5],
+        )));
         assert_eq!(adjacency.forks().collect::<Vec<_>>(), [[0, 1, 2]]);
         let sides: Vec<_> = (0..5).map(|t| adjacency.sides(t)).collect();
         assert_eq!(sides, [[0, 0, 0], [1, 4, 1], [2, 2, 4], [3, 3, 3], [4, 2, 1]]);
@@ -162,7 +168,7 @@ mod tests {
             let complete: Vec<bool> = (0..vertices).map(|_| below(3) > 0).collect();
             let triangles: Vec<[u32; 3]> = (0..faces).map(|_| [0; 3].map(|_| below(vertices) as u32)).collect();
             let mesh = mesh(&triangles, &complete);
-            let adjacency = Adjacency::of(&mesh);
+            let adjacency = Adjacency::of(&Bands::of(&mesh));
             let (beside, flags) = plainly(&mesh);
             for t in 0..adjacency.len() {
                 let alone = t as u32;

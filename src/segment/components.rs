@@ -46,7 +46,8 @@ impl Components {
         size_of: impl Fn(u32) -> u64 + Sync,
     ) -> Components {
         // Bands of triangles by themselves, then what crosses their borders.
-        let mut parent = vec![NONE; adjacency.len()];
+        let none = |n: usize| rayon::iter::repeat_n(NONE, n).collect::<Vec<u32>>();
+        let mut parent = none(adjacency.len());
         let crossings: Vec<Vec<[u32; 2]>> = parent
             .par_chunks_mut(BAND)
             .enumerate()
@@ -58,7 +59,7 @@ impl Components {
             forest.join_all(fork.iter().copied().filter(|&t| selected(t as usize)));
         }
         let lowest: Vec<u32> = (0..parent.len() as u32).into_par_iter().filter(|&t| parent[t as usize] == t).collect();
-        let mut of = vec![NONE; parent.len()];
+        let mut of = none(parent.len());
         let measured: Vec<InBand> = of
             .par_chunks_mut(BAND)
             .enumerate()
@@ -115,19 +116,49 @@ impl Components {
         }
     }
 
+    /// Folds what belongs to each component of those asked for: `add` takes triangles that follow one another, band by
+    /// band on all threads, and `merge` joins bands. Their order must not matter.
+    pub fn fold<A: Copy + Send + Sync>(
+        &self,
+        nothing: A,
+        asked: impl Fn(usize) -> bool + Sync,
+        add: impl Fn(A, Range<usize>) -> A + Sync,
+        merge: impl Fn(A, A) -> A,
+    ) -> Vec<A> {
+        let in_band = |(band, of): (usize, &[u32])| {
+            let (mut parts, mut start) = (BTreeMap::new(), BAND * band);
+            for run in of.chunk_by(|a, b| a == b) {
+                let triangles = start..start + run.len();
+                start = triangles.end;
+                if run[0] != NONE && asked(run[0] as usize) {
+                    let part = parts.entry(run[0]).or_insert(nothing);
+                    *part = add(*part, triangles);
+                }
+            }
+            parts
+        };
+        let bands: Vec<BTreeMap<u32, A>> = self.of.par_chunks(BAND).enumerate().map(in_band).collect();
+        let mut all = vec![nothing; self.count()];
+        for (part, value) in bands.into_iter().flatten() {
+            all[part as usize] = merge(all[part as usize], value);
+        }
+        all
+    }
+
     /// Which components, of those asked for, are wider in plan than so many metres; none is for 0.
-    pub fn wider_than(&self, mesh: &TileMesh, width_m: f64, asked: impl Fn(usize) -> bool) -> Vec<bool> {
+    pub fn wider_than(&self, mesh: &TileMesh, width_m: f64, asked: impl Fn(usize) -> bool + Sync) -> Vec<bool> {
         if width_m == 0.0 {
             return vec![false; self.count()];
         }
-        let mut bounds = vec![PlanBox::EMPTY; self.count()];
-        for (part, run) in self.runs() {
-            if let Some(bounds) = bounds.get_mut(part as usize)
-                && asked(part as usize)
-            {
-                run.flat_map(|t| mesh.corners(t as u32)).for_each(|p| bounds.include(p));
-            }
-        }
+        let add = |mut bounds: PlanBox, run: Range<usize>| {
+            run.flat_map(|t| mesh.corners(t as u32)).for_each(|p| bounds.include(p));
+            bounds
+        };
+        let merge = |mut bounds: PlanBox, other: PlanBox| {
+            bounds.merge(&other);
+            bounds
+        };
+        let bounds = self.fold(PlanBox::EMPTY, asked, add, merge);
         bounds.iter().map(|b| b.width_m() > width_m).collect()
     }
 }
@@ -273,6 +304,7 @@ impl Forest<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::bands::Bands;
     use super::*;
     use crate::geometry::DVec3;
 
@@ -314,7 +346,7 @@ mod tests {
                 positions: vec![DVec3::ZERO; vertices as usize],
                 ..TileMesh::default()
             };
-            let adjacency = Adjacency::of(&mesh);
+            let adjacency = Adjacency::of(&Bands::of(&mesh));
             let selected: Vec<bool> = (0..faces).map(|_| below(5) > 0).collect();
             let enough = below(6);
             let found = Components::at_least(&adjacency, |t| selected[t], enough, |t| u64::from(t % 3));

@@ -1,15 +1,13 @@
 //! What lies at the edges of a mesh, band by band of vertices.
 
+use super::bands::Bands;
 use crate::tile::TileMesh;
-use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Sorting pays above this many half-edges at one vertex: there is no limit to how many a broken mesh has.
 const FEW: usize = 24;
 /// Vertices of a band: its half-edges stay in the processor's cache.
 const BAND: usize = if cfg!(test) { 4 } else { 1 << 15 };
-/// Triangles that are passed over at once where none of them has an edge in a band.
-const BLOCK: usize = if cfg!(test) { 3 } else { 1 << 11 };
 
 /// What lies at the three sides of a triangle. Every band of vertices writes to sides of its own.
 pub(super) type Sides = [AtomicU32; 3];
@@ -36,71 +34,47 @@ impl Half {
     }
 }
 
-/// Bands of vertices, and where the triangles are that have edges there.
-pub(super) struct Bands<'m> {
-    mesh: &'m TileMesh,
-    /// Lowest and highest of the vertices with which the half-edges of a block of triangles are kept.
-    reach: Vec<[u32; 2]>,
+/// How many bands the vertices of a tile are joined in.
+pub(super) fn count(mesh: &TileMesh) -> usize {
+    mesh.positions.len().div_ceil(BAND)
 }
 
-impl Bands<'_> {
-    pub(super) fn new(mesh: &TileMesh) -> Bands<'_> {
-        let reach = |block: &[[u32; 3]]| {
-            block.iter().fold([u32::MAX, 0], |[low, high], &[a, b, c]| {
-                [low.min(a).min(b).min(c), high.max(a.min(b)).max(b.min(c)).max(c.min(a))]
-            })
-        };
-        Bands { mesh, reach: mesh.triangles.chunks(BLOCK).map(reach).collect() }
+/// Writes down what lies side by side at the edges that are kept with the vertices of a band, and returns the rest:
+/// half-edges are put beside their vertices by counting, and compared within these short lists.
+pub(super) fn join(bands: &Bands, band: usize, sides: &[Sides]) -> Ends {
+    let mesh = bands.mesh;
+    let vertices = BAND * band..(BAND * (band + 1)).min(mesh.positions.len());
+    let (first, count) = (vertices.start as u32, vertices.len());
+    // After the lists are filled, the one of the vertex in place v ends at `end[v]`. Half-edges of other bands are
+    // counted behind the last.
+    let place = |v: u32, w: u32| (v.min(w).wrapping_sub(first) as usize).min(count);
+    let mut end = vec![0u32; count + 2];
+    for &[a, b, c] in bands.near(&vertices).flat_map(|block| &mesh.triangles[block]) {
+        end[place(a, b) + 1] += 1;
+        end[place(b, c) + 1] += 1;
+        end[place(c, a) + 1] += 1;
     }
-
-    /// How many bands there are.
-    pub(super) fn count(&self) -> usize {
-        self.mesh.positions.len().div_ceil(BAND)
+    for v in 1..=count {
+        end[v] += end[v - 1];
     }
-
-    /// Writes down what lies side by side at the edges that are kept with the vertices of a band, and returns the
-    /// rest: half-edges are put beside their vertices by counting, and compared within these short lists.
-    pub(super) fn join(&self, band: usize, sides: &[Sides]) -> Ends {
-        let vertices = BAND * band..(BAND * (band + 1)).min(self.mesh.positions.len());
-        let (first, count) = (vertices.start as u32, vertices.len());
-        // After the lists are filled, the one of the vertex in place v ends at `end[v]`. Half-edges of other bands are
-        // counted behind the last.
-        let place = |v: u32, w: u32| (v.min(w).wrapping_sub(first) as usize).min(count);
-        let mut end = vec![0u32; count + 2];
-        for &[a, b, c] in self.near(&vertices).flat_map(|block| &self.mesh.triangles[block]) {
-            end[place(a, b) + 1] += 1;
-            end[place(b, c) + 1] += 1;
-            end[place(c, a) + 1] += 1;
-        }
-        for v in 1..=count {
-            end[v] += end[v - 1];
-        }
-        let mut halves = vec![Half::default(); end[count] as usize];
-        for t in self.near(&vertices).flatten() {
-            let [a, b, c] = self.mesh.triangles[t];
-            for (side, [v, w]) in [[a, b], [b, c], [c, a]].into_iter().enumerate() {
-                let place = place(v, w);
-                if place < count {
-                    halves[end[place] as usize] = Half::new(v.max(w), t, side);
-                    end[place] += 1;
-                }
+    let mut halves = vec![Half::default(); end[count] as usize];
+    for t in bands.near(&vertices).flatten() {
+        let [a, b, c] = mesh.triangles[t];
+        for (side, [v, w]) in [[a, b], [b, c], [c, a]].into_iter().enumerate() {
+            let place = place(v, w);
+            if place < count {
+                halves[end[place] as usize] = Half::new(v.max(w), t, side);
+                end[place] += 1;
             }
         }
-        let mut around = Around { mesh: self.mesh, sides, ends: Ends::default() };
-        let mut start = 0;
-        for (low, &last) in (first..).zip(&end[..count]) {
-            around.vertex(low, &mut halves[start..last as usize]);
-            start = last as usize;
-        }
-        around.ends
     }
-
-    /// Blocks of triangles, some of which have edges in a band.
-    fn near<'a>(&'a self, vertices: &'a Range<usize>) -> impl Iterator<Item = Range<usize>> + 'a {
-        let meets = |[low, high]: [u32; 2]| (low as usize) < vertices.end && high as usize >= vertices.start;
-        let block = |i: usize| BLOCK * i..(BLOCK * (i + 1)).min(self.mesh.triangles.len());
-        self.reach.iter().enumerate().filter(move |(_, reach)| meets(**reach)).map(move |(i, _)| block(i))
+    let mut around = Around { mesh, sides, ends: Ends::default() };
+    let mut start = 0;
+    for (low, &last) in (first..).zip(&end[..count]) {
+        around.vertex(low, &mut halves[start..last as usize]);
+        start = last as usize;
     }
+    around.ends
 }
 
 /// What lies at edges where not just two triangles meet.

@@ -1,22 +1,22 @@
 //! Flat bodies: sheets and ridges are no stones.
 
+use super::bands::Bands;
 use super::state::{Labels, NONE, OVERSIZE, State};
 use crate::geometry::{DVec3, flatter_than};
-use crate::tile::TileMesh;
 use rayon::prelude::*;
 
 /// Removes bodies whose convex hull is less spherical than a grain may be: sheets and ridges.
 ///
 /// Oversize bodies are not tested: nobody sees them whole.
-pub fn drop_flat(mesh: &TileMesh, labels: &mut Labels, min_sphericity: f64) {
+pub fn drop_flat(bands: &Bands, labels: &mut Labels, min_sphericity: f64) {
     if min_sphericity <= 0.0 {
         return;
     }
-    let bodies = Bodies::of(mesh, labels);
+    let bodies = Bodies::of(bands, labels);
     let flat: Vec<u32> = (0..bodies.lowest.len())
         .into_par_iter()
         .filter(|&body| {
-            let points: Vec<DVec3> = bodies.vertices(body).iter().map(|&v| mesh.positions[v as usize]).collect();
+            let points: Vec<DVec3> = bodies.vertices(body).iter().map(|&v| bands.mesh.positions[v as usize]).collect();
             flatter_than(&points, min_sphericity)
         })
         .map(|body| bodies.lowest[body])
@@ -47,39 +47,42 @@ struct Bodies {
 }
 
 impl Bodies {
-    fn of(mesh: &TileMesh, labels: &Labels) -> Bodies {
-        let lowest: Vec<u32> = (0..).zip(&labels.label).filter(|(t, label)| t == *label).map(|(t, _)| t).collect();
+    fn of(bands: &Bands, labels: &Labels) -> Bodies {
+        let is_lowest = |(t, label): &(usize, &u32)| *t as u32 == **label;
+        let lowest: Vec<u32> = labels.label.par_iter().enumerate().filter(is_lowest).map(|(t, _)| t as u32).collect();
         // Nearly every vertex has one body; further ones, where bodies touch in a point, come beside.
-        let mut first = vec![NONE; mesh.positions.len()];
-        let mut further: Vec<(u32, u32)> = Vec::new();
-        let (mut last, mut number) = (NONE, NONE);
-        for (corners, &label) in mesh.triangles.iter().zip(&labels.label).filter(|(_, label)| **label < OVERSIZE) {
-            if label != last {
-                // Triangles of one body mostly follow one another.
-                (last, number) = (label, lowest.partition_point(|&t| t < label) as u32);
+        let body = |t: usize| Some(labels.label[t]).filter(|&label| label < OVERSIZE);
+        let mut first: Vec<u32> = rayon::iter::repeat_n(NONE, bands.mesh.positions.len()).collect();
+        bands.mark(&mut first, body, |first, body| {
+            if *first == NONE {
+                *first = body;
             }
-            for &v in corners {
-                let first = &mut first[v as usize];
-                if *first != number {
-                    if *first == NONE {
-                        *first = number;
-                    } else {
-                        further.push((number, v));
-                    }
-                }
-            }
-        }
+        });
+        let first_of = &first;
+        let others = |(t, corners): (usize, &[u32; 3])| {
+            let all = body(t).map(|body| corners.map(|v| (body, v)));
+            all.into_iter().flatten().filter(|&(body, v)| first_of[v as usize] != body)
+        };
+        let mut further: Vec<(u32, u32)> = bands.mesh.triangles.par_iter().enumerate().flat_map_iter(others).collect();
         further.sort_unstable();
         further.dedup();
+        // Vertices of one body mostly follow one another.
+        let (mut last, mut number) = (NONE, 0);
+        let mut number = |body: u32| {
+            if body != last {
+                (last, number) = (body, lowest.partition_point(|&t| t < body));
+            }
+            number
+        };
         let mut end = vec![0; lowest.len() + 1];
         let all = first.iter().filter(|body| **body != NONE).chain(further.iter().map(|(body, _)| body));
-        all.for_each(|&body| end[body as usize + 1] += 1);
+        all.for_each(|&body| end[number(body) + 1] += 1);
         for body in 1..end.len() {
             end[body] += end[body - 1];
         }
         let mut vertices = vec![0u32; end[lowest.len()]];
         let mut put = |body: u32, v: u32| {
-            let place = &mut end[body as usize];
+            let place = &mut end[number(body)];
             vertices[*place] = v;
             *place += 1;
         };
@@ -87,9 +90,10 @@ impl Bodies {
             put(body, v as u32);
         }
         further.iter().for_each(|&(body, v)| put(body, v));
+        let touched: Vec<usize> = further.chunk_by(|a, b| a.0 == b.0).map(|same| number(same[0].0)).collect();
         let mut bodies = Bodies { lowest, end, vertices };
-        for same in further.chunk_by(|a, b| a.0 == b.0) {
-            let range = bodies.range(same[0].0 as usize);
+        for body in touched {
+            let range = bodies.range(body);
             bodies.vertices[range].sort_unstable();
         }
         bodies

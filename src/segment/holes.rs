@@ -1,32 +1,31 @@
 //! Concave pockets inside a single grain are filled.
 
 use super::adjacency::Adjacency;
+use super::bands::Bands;
 use super::components::Components;
 use super::state::{Labels, NONE, OVERSIZE, State, UNSURE};
 use crate::settings::SegmentSettings;
-use crate::tile::TileMesh;
+use rayon::prelude::*;
+use std::ops::Range;
 
 /// Fills every removed component that touches, by shared vertices, exactly one body.
 ///
 /// A pocket wider than the widest grain is open ground; so is, unless `fill_edge_holes`, one that an
 /// edge of the mesh bounds, since nobody knows what it touches beyond; so is one in an oversize body.
-pub fn fill_holes(mesh: &TileMesh, adjacency: &Adjacency, settings: &SegmentSettings, labels: &mut Labels) {
+pub fn fill_holes(bands: &Bands, adjacency: &Adjacency, settings: &SegmentSettings, labels: &mut Labels) {
+    let mesh = bands.mesh;
     let pockets = Components::of(adjacency, |t| labels.state[t] == State::Removed);
-    let touching = contacts(mesh, labels);
-    let mut contact = vec![NONE; pockets.count()];
-    for (pocket, run) in pockets.runs() {
-        let Some(contact) = contact.get_mut(pocket as usize) else { continue };
-        let mut all = *contact;
+    let touching = contacts(bands, labels);
+    let add = |mut all: u32, run: Range<usize>| {
         for corners in &mesh.triangles[run] {
             if all & !UNSURE == SEVERAL {
                 break;
             }
-            for touching in corners.map(|v| touching[v as usize]).into_iter().filter(|&t| t != NONE) {
-                all = merge(all, touching);
-            }
+            all = corners.map(|v| touching[v as usize]).into_iter().fold(all, merge);
         }
-        *contact = all;
-    }
+        all
+    };
+    let contact = pockets.fold(NONE, |_| true, add, merge);
     drop(touching);
     let undecided = |pocket: usize| contact[pocket] & !UNSURE != SEVERAL && contact[pocket] & !UNSURE != OVERSIZE;
     let mut stays = pockets.wider_than(mesh, settings.max_grain_m, undecided);
@@ -64,20 +63,17 @@ fn merge(a: u32, b: u32) -> u32 {
 }
 
 /// The only body that touches each vertex ([`NONE`], or [`SEVERAL`]), [`UNSURE`] if that is not certain.
-fn contacts(mesh: &TileMesh, labels: &Labels) -> Vec<u32> {
-    let mut touching: Vec<u32> = mesh.complete.iter().map(|&c| if c { NONE } else { NONE | UNSURE }).collect();
-    for ((corners, state), &label) in mesh.triangles.iter().zip(&labels.state).zip(&labels.label) {
-        let adds = match state {
-            State::Kept => label,
-            State::Unknown => NONE | UNSURE,
-            State::Removed => continue,
-        };
-        for &v in corners {
-            let touching = &mut touching[v as usize];
-            if *touching != adds {
-                *touching = merge(*touching, adds);
-            }
+fn contacts(bands: &Bands, labels: &Labels) -> Vec<u32> {
+    let mut touching: Vec<u32> = bands.mesh.complete.par_iter().map(|&c| if c { NONE } else { NONE | UNSURE }).collect();
+    let adds = |t: usize| match labels.state[t] {
+        State::Kept => Some(labels.label[t]),
+        State::Unknown => Some(NONE | UNSURE),
+        State::Removed => None,
+    };
+    bands.mark(&mut touching, adds, |touching, adds| {
+        if *touching != adds {
+            *touching = merge(*touching, adds);
         }
-    }
+    });
     touching
 }

@@ -20,6 +20,7 @@
 //! When something that touches the core is still unknown, the tile is worked again with a wider halo.
 
 pub mod adjacency;
+pub mod bands;
 pub mod bodies;
 pub mod components;
 pub mod concave;
@@ -36,6 +37,7 @@ use crate::index::Scale;
 use crate::settings::{AreaRule, SegmentSettings};
 use crate::tile::TileMesh;
 use adjacency::Adjacency;
+use bands::Bands;
 use state::{NONE, State};
 
 /// The size of a triangle, in a unit that adds up exactly, and the smallest grain in that unit.
@@ -103,7 +105,8 @@ pub fn segment(
     settings: &SegmentSettings,
     watch: &mut dyn FnMut(Step, &[State]),
 ) -> Settled {
-    let adjacency = Adjacency::of(mesh);
+    let bands = Bands::of(mesh);
+    let adjacency = Adjacency::of(&bands);
     let sizes = Sizes::new(scale, settings);
     let tall = concave::too_tall(mesh, settings);
     let mut state = concave::remove_concave(mesh, divergence, scale.mean_edge_m, settings);
@@ -112,16 +115,16 @@ pub fn segment(
     concave::give_back_dents(mesh, &adjacency, &sizes, &mut state);
     watch(Step::Dents, &state);
     for _ in 0..settings.erosion_iterations {
-        morphology::erode(mesh, &mut state);
+        morphology::erode(&bands, &mut state);
     }
     watch(Step::Erosion, &state);
     let mut labels = bodies::tell_apart(mesh, &adjacency, &sizes, state, settings);
     watch(Step::SmallBodies, &labels.state);
-    flat::drop_flat(mesh, &mut labels, settings.min_sphericity);
+    flat::drop_flat(&bands, &mut labels, settings.min_sphericity);
     watch(Step::FlatBodies, &labels.state);
     let oversize = settle::oversize_pieces(mesh, &adjacency, &labels);
     for ring in 1..=settings.dilation_iterations {
-        morphology::dilate(mesh, &mut labels);
+        morphology::dilate(&bands, &mut labels);
         for &t in &tall {
             labels.state[t as usize] = State::Removed;
             labels.label[t as usize] = NONE;
@@ -129,7 +132,7 @@ pub fn segment(
         watch(Step::Dilation(ring), &labels.state);
     }
     if settings.fill_holes {
-        holes::fill_holes(mesh, &adjacency, settings, &mut labels);
+        holes::fill_holes(&bands, &adjacency, settings, &mut labels);
     }
     watch(Step::Holes, &labels.state);
     settle::settle(mesh, &adjacency, &sizes, &labels, oversize)

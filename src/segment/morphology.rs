@@ -5,8 +5,8 @@
 //! in file order and lets the first win; here the lowest triangle proposes, which is the same nearly
 //! everywhere).
 
+use super::bands::Bands;
 use super::state::{Labels, NONE, State, UNSURE};
-use crate::tile::TileMesh;
 use rayon::prelude::*;
 
 /// A removed triangle lies at the vertex.
@@ -16,16 +16,15 @@ const DOUBTFUL: u8 = 2;
 
 /// Takes one ring off: a triangle goes when one of its vertices also belongs to a removed triangle. The
 /// edge of the mesh is not eroded.
-pub fn erode(mesh: &TileMesh, state: &mut [State]) {
-    let mut seen: Vec<u8> = mesh.complete.iter().map(|&c| if c { 0 } else { DOUBTFUL }).collect();
-    for (corners, s) in mesh.triangles.iter().zip(&*state) {
-        let mark = match s {
-            State::Kept => continue,
-            State::Removed => AT_REMOVED,
-            State::Unknown => DOUBTFUL,
-        };
-        corners.iter().for_each(|&v| seen[v as usize] |= mark);
-    }
+pub fn erode(bands: &Bands, state: &mut [State]) {
+    let mesh = bands.mesh;
+    let mut seen: Vec<u8> = mesh.complete.par_iter().map(|&c| if c { 0 } else { DOUBTFUL }).collect();
+    let mark = |t: usize| match state[t] {
+        State::Kept => None,
+        State::Removed => Some(AT_REMOVED),
+        State::Unknown => Some(DOUBTFUL),
+    };
+    bands.mark(&mut seen, mark, |seen, mark| *seen |= mark);
     mesh.triangles.par_iter().zip(state).filter(|(_, s)| **s != State::Removed).for_each(|(corners, s)| {
         let seen = corners.iter().fold(0, |all, &v| all | seen[v as usize]);
         if seen & AT_REMOVED != 0 {
@@ -41,24 +40,64 @@ pub fn erode(mesh: &TileMesh, state: &mut [State]) {
 /// A vertex carries the body of its highest kept triangle. A vertex that carries none takes the body
 /// proposed by the lowest triangle that touches exactly one body there. A triangle joins when its three
 /// vertices then agree; one whose vertices agreed before (a pocket inside a body, or open ground) stays.
-pub fn dilate(mesh: &TileMesh, labels: &mut Labels) {
-    let before = carried(mesh, labels);
-    let (after, front) = proposed(mesh, labels, &before);
-    for &t in &front {
-        let corners = mesh.triangles[t as usize];
-        let was = corners.map(|v| before[v as usize]);
-        if between_two_bodies(was) {
-            continue;
-        }
-        let now = corners.map(|v| after[v as usize]);
-        // What proposals for its vertices hang on includes its vertices themselves.
-        if (now[0] | now[1] | now[2]) & UNSURE != 0 {
-            labels.state[t as usize] = State::Unknown;
-        } else if now[0] == now[1] && now[1] == now[2] && now[0] != NONE {
-            labels.state[t as usize] = State::Kept;
-            labels.label[t as usize] = now[0];
+pub fn dilate(bands: &Bands, labels: &mut Labels) {
+    let mut carried = carried(bands, labels);
+    let front = front(bands, labels, &carried);
+    for proposal in &front {
+        for v in bands.mesh.triangles[proposal.triangle as usize] {
+            let label = &mut carried[v as usize];
+            let (free, unsure) = (*label & !UNSURE == NONE, (*label | proposal.body) & UNSURE);
+            *label = unsure | !UNSURE & if free { proposal.body } else { *label };
         }
     }
+    for t in front.iter().filter(|p| p.may_join).map(|p| p.triangle as usize) {
+        let now = bands.mesh.triangles[t].map(|v| carried[v as usize]);
+        // What proposals for its vertices hang on includes its vertices themselves.
+        if (now[0] | now[1] | now[2]) & UNSURE != 0 {
+            labels.state[t] = State::Unknown;
+        } else if now[0] == now[1] && now[1] == now[2] && now[0] != NONE {
+            labels.state[t] = State::Kept;
+            labels.label[t] = now[0];
+        }
+    }
+}
+
+/// The body that each vertex carries, [`UNSURE`] if that is not certain.
+fn carried(bands: &Bands, labels: &Labels) -> Vec<u32> {
+    let mut carried: Vec<u32> = bands.mesh.complete.par_iter().map(|&c| if c { NONE } else { NONE | UNSURE }).collect();
+    let says = |t: usize| match labels.state[t] {
+        State::Removed => None,
+        State::Kept => Some(labels.label[t]),
+        State::Unknown => Some(UNSURE),
+    };
+    bands.mark(&mut carried, says, |carried, says| match says {
+        UNSURE => *carried |= UNSURE,
+        body => *carried = *carried & UNSURE | body,
+    });
+    carried
+}
+
+/// A triangle whose vertices do not agree, or not for certain.
+struct Proposal {
+    triangle: u32,
+    /// The body that it proposes for its vertices, [`NONE`] if that is none or not one; [`UNSURE`] if one of them is.
+    body: u32,
+    /// Whether it may join a body itself: it is removed, and not between two.
+    may_join: bool,
+}
+
+/// All proposals, ascending.
+fn front(bands: &Bands, labels: &Labels, carried: &[u32]) -> Vec<Proposal> {
+    let proposal = |(t, corners): (usize, &[u32; 3])| {
+        let was = corners.map(|v| carried[v as usize]);
+        let unsure = (was[0] | was[1] | was[2]) & UNSURE;
+        if unsure == 0 && was[0] == was[1] && was[1] == was[2] {
+            return None;
+        }
+        let may_join = labels.state[t] == State::Removed && !between_two_bodies(was);
+        Some(Proposal { triangle: t as u32, body: only_body(was.map(|l| l & !UNSURE)) | unsure, may_join })
+    };
+    bands.mesh.triangles.par_iter().enumerate().filter_map(proposal).collect()
 }
 
 fn between_two_bodies(label: [u32; 3]) -> bool {
@@ -66,43 +105,6 @@ fn between_two_bodies(label: [u32; 3]) -> bool {
         let (a, b) = (label[i], label[(i + 1) % 3]);
         a != b && a < NONE && b < NONE
     })
-}
-
-/// The body that each vertex carries, [`UNSURE`] if that is not certain.
-fn carried(mesh: &TileMesh, labels: &Labels) -> Vec<u32> {
-    let mut carried: Vec<u32> = mesh.complete.iter().map(|&c| if c { NONE } else { NONE | UNSURE }).collect();
-    for ((corners, state), &label) in mesh.triangles.iter().zip(&labels.state).zip(&labels.label) {
-        match state {
-            State::Removed => {}
-            State::Kept => corners.iter().map(|&v| v as usize).for_each(|v| carried[v] = carried[v] & UNSURE | label),
-            State::Unknown => corners.iter().for_each(|&v| carried[v as usize] |= UNSURE),
-        }
-    }
-    carried
-}
-
-/// The body that each vertex carries or is given, [`UNSURE`] if that is not certain; and the removed triangles
-/// whose vertices do not agree before.
-fn proposed(mesh: &TileMesh, labels: &Labels, before: &[u32]) -> (Vec<u32>, Vec<u32>) {
-    let mut after = before.to_vec();
-    let mut front = Vec::new();
-    for (t, corners) in mesh.triangles.iter().enumerate() {
-        let was = corners.map(|v| before[v as usize]);
-        let unsure = (was[0] | was[1] | was[2]) & UNSURE;
-        if unsure == 0 && was[0] == was[1] && was[1] == was[2] {
-            continue;
-        }
-        if labels.state[t] == State::Removed {
-            front.push(t as u32);
-        }
-        let proposal = only_body(was.map(|l| l & !UNSURE));
-        for &v in corners {
-            let label = &mut after[v as usize];
-            let free = *label & !UNSURE == NONE;
-            *label = if free { proposal | *label & UNSURE } else { *label } | unsure;
-        }
-    }
-    (after, front)
 }
 
 /// The one body among three labels; [`NONE`] where there is none or more than one.

@@ -118,10 +118,7 @@ pub fn settle(mesh: &TileMesh, adjacency: &Adjacency, sizes: &Sizes, labels: &La
     let open = bodies.holding(adjacency.open());
     let at_mesh_edge = bodies.holding(adjacency.at_mesh_edge());
     let doubtful = bodies.beside(adjacency, &unknown);
-    let mut triangles = vec![0usize; bodies.count()];
-    for (part, run) in bodies.runs().filter(|(part, _)| *part != NONE) {
-        triangles[part as usize] += run.len();
-    }
+    let triangles = bodies.fold(0, |_| true, |count, run| count + run.len(), |a, b| a + b);
     let owned = |part: usize| mesh.in_core[bodies.lowest[part] as usize];
     let closed = |part: usize| !open[part] && !doubtful[part];
     let mut grains: Vec<Option<Segment>> = (0..bodies.count())

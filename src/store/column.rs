@@ -169,6 +169,17 @@ impl<T: Element> Column<T> {
         self.each_piece(range, |bytes| to.extend(bytes.chunks_exact(T::BYTES).map(T::get)))
     }
 
+    /// Fills a slice with the elements from number `first` on.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn read_into(&self, first: u64, to: &mut [T]) -> Result<(), StoreError> {
+        let mut rest = to.iter_mut();
+        self.each_piece(first..first + rest.len() as u64, |bytes| {
+            bytes.chunks_exact(T::BYTES).zip(&mut rest).for_each(|(bytes, to)| *to = T::get(bytes));
+        })
+    }
+
     fn each_piece(&self, range: Range<u64>, mut take: impl FnMut(&[u8])) -> Result<(), StoreError> {
         let step = (PIECE_BYTES / T::BYTES) as u64;
         let mut piece = Piece::new();
@@ -298,6 +309,9 @@ mod tests {
         column.read(5..99_990, &mut found).unwrap();
         assert_eq!(found[..5], [[0.0; 3]; 5]);
         assert!(found[5..].iter().zip(10..).all(|(&f, i)| f == element(i)));
+        let mut slice = vec![[0.0; 3]; 40_000];
+        column.read_into(20_000, &mut slice).unwrap();
+        assert!(slice.iter().zip(20_000..).all(|(&f, i)| f == element(i)));
         assert!(column.read(99_999..100_001, &mut found).is_err());
     }
 

@@ -1,6 +1,7 @@
 //! The mesh of a tile: core and halo, with what the cut left incomplete.
 
-use super::patch::{Patch, read_of};
+use super::patch::Patch;
+use super::read::read_of;
 use super::runs::Runs;
 use crate::geometry::{DVec3, triangle_area};
 use crate::index::{CellBlock, Index, MOST_COUNTED};

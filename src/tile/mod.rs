@@ -12,10 +12,12 @@ mod field;
 mod mesh;
 mod patch;
 mod plan;
+mod read;
 mod runs;
 
 pub use field::NormalField;
 pub use mesh::{BYTES_PER_TRIANGLE, Owned, TileMesh};
-pub use patch::{Patch, read_of};
+pub use patch::Patch;
 pub use plan::{CoreSize, Plan, Tile};
+pub use read::read_of;
 pub use runs::Runs;

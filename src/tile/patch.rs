@@ -1,9 +1,11 @@
 //! A patch: the triangles of a block of cells with their vertices, read from the index.
 
+use super::read::read_of;
 use super::runs::{Lookup, Runs};
 use crate::geometry::DVec3;
 use crate::index::{CellBlock, Index};
-use crate::store::{Column, Element, StoreError};
+use crate::store::StoreError;
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// Triangles whose centroid lies in a block of cells, with their vertices. Those outside the block, of which
@@ -20,10 +22,8 @@ pub struct Patch {
     pub corners: Vec<[u32; 3]>,
 }
 
-/// Vertices that lie so near one another in the index are read at one go.
-const READ_THROUGH: u64 = 256;
-/// Not more of them than so many.
-const READ_TOGETHER: u64 = 1 << 14;
+/// Triangles that one thread reads at a time.
+const PIECE: usize = if cfg!(test) { 3 } else { 1 << 15 };
 
 impl Patch {
     /// Reads a block of cells.
@@ -34,7 +34,7 @@ impl Patch {
         let triangles = Runs::new(index.triangles.ranges(&index.grid, block));
         let inside = Runs::new(index.vertices.ranges(&index.grid, block));
         let (mut corners, outside) = corners(index, &triangles, &inside)?;
-        let vertices = with_outside(&inside, outside, &mut corners);
+        let vertices = with_outside(&inside, &outside, &mut corners);
         let positions = read_of(index.positions(), &vertices)?;
         Ok(Patch { vertices, positions, triangles, corners })
     }
@@ -93,33 +93,40 @@ pub(super) fn each_triangle(index: &Index, block: &CellBlock, to: &mut impl Take
     Ok(())
 }
 
-/// Corners of the triangles as local numbers: those of `inside`, and behind them, in the order in which they
-/// were met, each time anew, those outside, which are returned by their survey numbers.
-fn corners(index: &Index, triangles: &Runs, inside: &Runs) -> Result<(Vec<[u32; 3]>, Vec<u64>), StoreError> {
-    let mut corners = Vec::with_capacity(triangles.len());
-    let mut outside = Vec::new();
-    let mut lookup = Lookup::new(inside);
-    for range in triangles.ranges() {
-        index.each_corners(range.clone(), |triangles| {
-            corners.extend(triangles.iter().map(|numbers| {
-                numbers.map(|number| {
-                    lookup.local(number).unwrap_or_else(|| {
-                        outside.push(number);
-                        (inside.len() + outside.len() - 1) as u32
-                    })
-                })
-            }));
-        })?;
-    }
-    Ok((corners, outside))
+/// Corners of the triangles as local numbers, piece by piece on all threads: those of `inside`, and behind them, in
+/// the order in which a piece meets them, each time anew, those outside, which are returned for each piece by their
+/// survey numbers.
+fn corners(index: &Index, triangles: &Runs, inside: &Runs) -> Result<(Vec<[u32; 3]>, Vec<Vec<u64>>), StoreError> {
+    let mut corners = vec![[0; 3]; triangles.len()];
+    let read = |(piece, corners): (usize, &mut [[u32; 3]])| {
+        let mut outside = Vec::new();
+        let mut lookup = Lookup::new(inside);
+        let first = (PIECE * piece) as u32;
+        let mut to = corners.iter_mut();
+        for range in triangles.within(first..first + to.len() as u32) {
+            index.each_corners(range, |triangles| {
+                for (numbers, to) in triangles.iter().zip(&mut to) {
+                    *to = numbers.map(|number| {
+                        lookup.local(number).unwrap_or_else(|| {
+                            outside.push(number);
+                            (inside.len() + outside.len() - 1) as u32
+                        })
+                    });
+                }
+            })?;
+        }
+        Ok(outside)
+    };
+    let outside: Result<Vec<Vec<u64>>, StoreError> = corners.par_chunks_mut(PIECE).enumerate().map(read).collect();
+    Ok((corners, outside?))
 }
 
 /// Puts the vertices outside into their places, so that local numbers ascend with those of the survey.
-fn with_outside(inside: &Runs, met: Vec<u64>, corners: &mut [[u32; 3]]) -> Runs {
-    if met.is_empty() {
+fn with_outside(inside: &Runs, met: &[Vec<u64>], corners: &mut [[u32; 3]]) -> Runs {
+    let mut outside = met.concat();
+    if outside.is_empty() {
         return inside.clone();
     }
-    let mut outside = met.clone();
     outside.sort_unstable();
     outside.dedup();
     let mut ranges: Vec<Range<u64>> = Vec::with_capacity(inside.ranges().len() + outside.len());
@@ -149,47 +156,20 @@ fn with_outside(inside: &Runs, met: Vec<u64>, corners: &mut [[u32; 3]]) -> Runs 
             Some(*end)
         })
         .collect();
-    let of_met: Vec<u32> = met.iter().filter_map(|&v| all.local(v)).collect();
-    let mut run = 0;
-    for corner in corners.iter_mut().flatten() {
-        if let Some(&local) = (*corner as usize).checked_sub(inside.len()).and_then(|i| of_met.get(i)) {
-            *corner = local;
-            continue;
+    corners.par_chunks_mut(PIECE).zip(met).for_each(|(corners, met)| {
+        let of_met: Vec<u32> = met.iter().filter_map(|&v| all.local(v)).collect();
+        let mut run = 0;
+        for corner in corners.iter_mut().flatten() {
+            if let Some(&local) = (*corner as usize).checked_sub(inside.len()).and_then(|i| of_met.get(i)) {
+                *corner = local;
+                continue;
+            }
+            let start = |run: usize| if run == 0 { 0 } else { ends[run - 1] };
+            if !(start(run) <= *corner && *corner < ends[run]) {
+                run = ends.partition_point(|&end| end <= *corner);
+            }
+            *corner += shift[run];
         }
-        let start = |run: usize| if run == 0 { 0 } else { ends[run - 1] };
-        if !(start(run) <= *corner && *corner < ends[run]) {
-            run = ends.partition_point(|&end| end <= *corner);
-        }
-        *corner += shift[run];
-    }
+    });
     all
-}
-
-/// Reads the elements of a column that belong to the runs.
-///
-/// # Errors
-/// The column cannot be read.
-pub fn read_of<T: Element>(column: &Column<T>, runs: &Runs) -> Result<Vec<T>, StoreError> {
-    let mut found = Vec::with_capacity(runs.len());
-    let mut rest = runs.ranges();
-    let mut through = Vec::new();
-    while let Some(first) = rest.first() {
-        // Short gaps are read and left out.
-        let joins =
-            |w: &&[Range<u64>]| w[1].start - w[0].end <= READ_THROUGH && w[1].end - first.start <= READ_TOGETHER;
-        let near = rest.windows(2).take_while(joins).count() + 1;
-        let (together, after) = rest.split_at(near);
-        rest = after;
-        if together.len() == 1 {
-            column.read(first.clone(), &mut found)?;
-            continue;
-        }
-        let end = together.last().map_or(first.end, |r| r.end);
-        through.clear();
-        column.read(first.start..end, &mut through)?;
-        for range in together {
-            found.extend_from_slice(&through[(range.start - first.start) as usize..(range.end - first.start) as usize]);
-        }
-    }
-    Ok(found)
 }

@@ -56,6 +56,17 @@ impl Runs {
         Some(self.before[run] + (number - range.start) as u32)
     }
 
+    /// The survey's numbers of a range of local ones, as ascending ranges.
+    pub fn within(&self, local: Range<u32>) -> impl Iterator<Item = Range<u64>> + '_ {
+        let first = self.before.partition_point(|&b| b <= local.start).saturating_sub(1);
+        let runs = self.ranges.iter().zip(&self.before).skip(first);
+        runs.take_while(move |(_, before)| **before < local.end).filter_map(move |(range, &before)| {
+            let number = |l: u32| range.start + u64::from(l - before);
+            let within = number(local.start.max(before))..number(local.end).min(range.end);
+            (within.start < within.end).then_some(within)
+        })
+    }
+
     /// Local numbers of the elements that both hold, as ascending ranges.
     pub fn shared<'a>(&'a self, other: &'a [Range<u64>]) -> impl Iterator<Item = Range<u32>> + 'a {
         other.iter().filter_map(|range| {
@@ -116,6 +127,10 @@ mod tests {
         }
         for absent in [0, 5, 8, 10, 11, 20, u64::MAX] {
             assert_eq!((runs.local(absent), lookup.local(absent)), (None, None));
+        }
+        for (start, end) in (0..=11).flat_map(|start| (start..=11).map(move |end| (start, end))) {
+            let numbers: Vec<u64> = runs.within(start..end).flatten().collect();
+            assert_eq!(numbers, (start..end).map(|l| runs.number(l)).collect::<Vec<_>>());
         }
         assert_eq!(runs.shared(&[9..10, 13..15]).collect::<Vec<_>>(), [2..3, 4..6]);
     }
