@@ -4,7 +4,7 @@
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use gravelometer::curvature::{InstructionSet, Stencil, divergence_with, nearest_centroid_m_with};
+use gravelometer::curvature::{InstructionSet, Stencil, divergence, nearest_centroid_m};
 use gravelometer::geometry::{DVec3, PlanBox, triangle_area, triangle_centroid, triangle_normal};
 use gravelometer::tile::NormalField;
 
@@ -53,18 +53,18 @@ fn sheet() -> (Vec<DVec3>, NormalField, f64) {
 fn kernel(c: &mut Criterion) {
     let (vertices, field, area) = sheet();
     let side_m = area.sqrt();
-    let near = nearest_centroid_m_with(&field, &vertices, side_m, InstructionSet::Scalar);
-    let spacing_m = near.iter().map(|d| d.unwrap()).sum::<f64>() / near.len() as f64;
+    let near = nearest_centroid_m(&field, &vertices, side_m, InstructionSet::Scalar);
+    let spacing_m = near.iter().map(|d| d.value().unwrap()).sum::<f64>() / near.len() as f64;
     let stencil = Stencil { spacing_m, offset_m: 2.0 * spacing_m, neighbours: 25, side_m };
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     let mut group = c.benchmark_group("curvature");
     group.sample_size(10);
     for set in InstructionSet::available() {
         group.bench_function(format!("divergence/{set:?}"), |b| {
-            b.iter(|| one.install(|| divergence_with(&field, &vertices, &stencil, set)));
+            b.iter(|| one.install(|| divergence(&field, &vertices, &stencil, set)));
         });
         group.bench_function(format!("nearest/{set:?}"), |b| {
-            b.iter(|| one.install(|| nearest_centroid_m_with(&field, &vertices, side_m, set)));
+            b.iter(|| one.install(|| nearest_centroid_m(&field, &vertices, side_m, set)));
         });
     }
     group.finish();

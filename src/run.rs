@@ -204,7 +204,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let files = write(&folder, &results, progress, control)?;
     if lost.is_empty() {
         drop((index, curvature, findings));
-        work.finish();
+        crew.pool.install(|| work.finish());
     }
     let (triangles, costs) = (reach.triangles(), meter.costs());
     Ok(Outcome { files, catalogue, lost, segmented_per_triangle, curvature_per_triangle, triangles, costs })

@@ -4,7 +4,7 @@
 
 mod support;
 
-use gravelometer::curvature::{Stencil, divergence};
+use gravelometer::curvature::{InstructionSet, Stencil, divergence};
 use gravelometer::geometry::{DVec3, sphericity};
 use gravelometer::index::{Index, Scale};
 use gravelometer::measure::{Wanted, measure};
@@ -100,10 +100,10 @@ fn our_divergence(g: &Golden) -> Vec<f64> {
     let scale = g.index.scale;
     let field = NormalField::load(&g.index, &g.index.grid.all()).unwrap();
     let side = scale.mean_triangle_area_m2.sqrt();
-    let nearest = gravelometer::curvature::nearest_centroid_m(&field, &g.points, side);
-    let spacing = nearest.iter().map(|d| d.unwrap()).sum::<f64>() / nearest.len() as f64;
+    let nearest = gravelometer::curvature::nearest_centroid_m(&field, &g.points, side, InstructionSet::best());
+    let spacing = nearest.iter().map(|d| d.value().unwrap()).sum::<f64>() / nearest.len() as f64;
     let stencil = Stencil::new(spacing, scale.mean_triangle_area_m2, &preset().curvature);
-    divergence(&field, &g.points, &stencil).into_iter().map(|d| d.unwrap()).collect()
+    divergence(&field, &g.points, &stencil, InstructionSet::best()).into_iter().map(|d| d.value().unwrap()).collect()
 }
 
 fn whole(g: &Golden) -> TileMesh {

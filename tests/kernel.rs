@@ -4,7 +4,7 @@
 
 mod support;
 
-use gravelometer::curvature::{InstructionSet, Neighbours, Stencil, divergence_with, nearest_centroid_m_with};
+use gravelometer::curvature::{self, Certain, InstructionSet, Neighbours, Stencil};
 use gravelometer::geometry::{DVec3, PlanBox, triangle_area, triangle_centroid, triangle_normal};
 use gravelometer::tile::NormalField;
 
@@ -180,6 +180,14 @@ fn reference(field: &NormalField, p: DVec3, s: &Stencil) -> Option<f64> {
     Some(((means[0] - means[1]) + (means[2] - means[3]) + (means[4] - means[5])) / (2.0 * s.offset_m))
 }
 
+fn divergence(field: &NormalField, points: &[DVec3], s: &Stencil, set: InstructionSet) -> Vec<Option<f64>> {
+    curvature::divergence(field, points, s, set).into_iter().map(Certain::value).collect()
+}
+
+fn nearest_centroid_m(field: &NormalField, points: &[DVec3], side_m: f64, set: InstructionSet) -> Vec<Option<f64>> {
+    curvature::nearest_centroid_m(field, points, side_m, set).into_iter().map(Certain::value).collect()
+}
+
 fn bits(values: &[Option<f64>]) -> Vec<Option<u64>> {
     values.iter().map(|v| v.map(f64::to_bits)).collect()
 }
@@ -192,7 +200,7 @@ fn every_instruction_set_gives_the_bits_of_a_plain_search() {
             let expected: Vec<_> = cloud.points.iter().map(|&p| reference(&cloud.field, p, &stencil)).collect();
             assert!(expected.iter().all(Option::is_some), "{}: everything is loaded", cloud.name);
             for set in InstructionSet::available() {
-                let found = divergence_with(&cloud.field, &cloud.points, &stencil, set);
+                let found = divergence(&cloud.field, &cloud.points, &stencil, set);
                 assert_eq!(bits(&found), bits(&expected), "{}, {k} neighbours, {set:?}", cloud.name);
             }
         }
@@ -228,7 +236,7 @@ fn golden_beds_have_the_bits_of_the_exact_search_on_one_thread_and_two() {
     for name in ["bed_0.3M", "bed3d_1M"] {
         let Some(mut bed) = golden(name) else { return };
         let stencil = bed.stencil(25);
-        let whole = divergence_with(&bed.field, &bed.points, &stencil, InstructionSet::best());
+        let whole = divergence(&bed.field, &bed.points, &stencil, InstructionSet::best());
         let every = |i: usize| i * 23;
         bed.points = (0..bed.points.len().div_ceil(23)).map(|i| bed.points[every(i)]).collect();
         let search = Neighbours::new(&bed.field, 2.5 * bed.side_m);
@@ -252,7 +260,7 @@ fn golden_beds_have_the_bits_of_the_exact_search_on_one_thread_and_two() {
         for set in InstructionSet::available() {
             for threads in [1, 2] {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-                let found = pool.install(|| divergence_with(&bed.field, &bed.points, &stencil, set));
+                let found = pool.install(|| divergence(&bed.field, &bed.points, &stencil, set));
                 assert_eq!(bits(&found), bits(&expected), "{name}, {set:?}, {threads} threads");
             }
         }
@@ -273,7 +281,7 @@ fn the_nearest_centroid_is_that_of_a_plain_search() {
             })
             .collect();
         for set in InstructionSet::available() {
-            let found = nearest_centroid_m_with(&cloud.field, &cloud.points, cloud.side_m, set);
+            let found = nearest_centroid_m(&cloud.field, &cloud.points, cloud.side_m, set);
             assert_eq!(bits(&found), bits(&expected), "{}, {set:?}", cloud.name);
         }
     }
@@ -299,8 +307,8 @@ fn a_field_cut_to_a_box_gives_the_same_bits_or_none() {
                 let stencil = cloud.stencil(k);
                 let expected: Vec<_> = cloud.points.iter().map(|&p| reference(&cut, p, &stencil)).collect();
                 for set in InstructionSet::available() {
-                    let whole = divergence_with(&cloud.field, &cloud.points, &stencil, set);
-                    let found = divergence_with(&cut, &cloud.points, &stencil, set);
+                    let whole = divergence(&cloud.field, &cloud.points, &stencil, set);
+                    let found = divergence(&cut, &cloud.points, &stencil, set);
                     assert_eq!(bits(&found), bits(&expected), "{}, {k} neighbours, {set:?}", cloud.name);
                     assert!(found.iter().any(Option::is_none), "{}: the box cuts nothing", cloud.name);
                     let known = |(f, _): &(&Option<f64>, &Option<f64>)| f.is_some();
@@ -320,13 +328,13 @@ fn the_order_and_company_of_points_do_not_matter() {
     let cloud = &clouds()[0];
     let stencil = cloud.stencil(25);
     for set in InstructionSet::available() {
-        let together = divergence_with(&cloud.field, &cloud.points, &stencil, set);
+        let together = divergence(&cloud.field, &cloud.points, &stencil, set);
         let reversed: Vec<DVec3> = cloud.points.iter().rev().copied().collect();
-        let mut backwards = divergence_with(&cloud.field, &reversed, &stencil, set);
+        let mut backwards = divergence(&cloud.field, &reversed, &stencil, set);
         backwards.reverse();
         assert_eq!(bits(&together), bits(&backwards), "{set:?}");
         for (p, value) in cloud.points.iter().zip(&together).step_by(17) {
-            assert_eq!(bits(&divergence_with(&cloud.field, &[*p], &stencil, set)), bits(&[*value]), "{set:?}");
+            assert_eq!(bits(&divergence(&cloud.field, &[*p], &stencil, set)), bits(&[*value]), "{set:?}");
         }
     }
 }
@@ -336,7 +344,7 @@ fn an_empty_field_is_uncertain_everywhere() {
     let field = NormalField { centroids: Vec::new(), normals: Vec::new(), loaded: EVERYWHERE };
     let stencil = Stencil { spacing_m: 1.0, offset_m: 2.0, neighbours: 25, side_m: 1.0 };
     for set in InstructionSet::available() {
-        assert_eq!(divergence_with(&field, &[DVec3::ZERO], &stencil, set), [None]);
-        assert_eq!(nearest_centroid_m_with(&field, &[DVec3::ZERO], 1.0, set), [None]);
+        assert_eq!(divergence(&field, &[DVec3::ZERO], &stencil, set), [None]);
+        assert_eq!(nearest_centroid_m(&field, &[DVec3::ZERO], 1.0, set), [None]);
     }
 }

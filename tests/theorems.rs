@@ -5,7 +5,7 @@
 mod support;
 
 use glam::{DMat3, DQuat};
-use gravelometer::curvature::{Stencil, divergence, nearest_centroid_m};
+use gravelometer::curvature::{InstructionSet, Stencil, divergence, nearest_centroid_m};
 use gravelometer::geometry::DVec3;
 use gravelometer::measure::attitude::Attitude;
 use gravelometer::measure::{Grain, Wanted, measure};
@@ -20,10 +20,16 @@ fn divergence_of(surface: &MemorySurface) -> (Vec<f64>, f64) {
     let index = support::indexed(surface);
     let field = NormalField::load(&index, &index.grid.all()).unwrap();
     let area_m2 = index.scale.mean_triangle_area_m2;
-    let nearest = nearest_centroid_m(&field, &surface.positions, area_m2.sqrt());
-    let spacing = nearest.iter().map(|d| d.unwrap()).sum::<f64>() / nearest.len() as f64;
+    let nearest = nearest_centroid_m(&field, &surface.positions, area_m2.sqrt(), InstructionSet::best());
+    let spacing = nearest.iter().map(|d| d.value().unwrap()).sum::<f64>() / nearest.len() as f64;
     let stencil = Stencil::new(spacing, area_m2, &CurvatureSettings::default());
-    (divergence(&field, &surface.positions, &stencil).into_iter().map(|d| d.unwrap()).collect(), spacing)
+    (
+        divergence(&field, &surface.positions, &stencil, InstructionSet::best())
+            .into_iter()
+            .map(|d| d.value().unwrap())
+            .collect(),
+        spacing,
+    )
 }
 
 fn median(mut values: Vec<f64>) -> f64 {

@@ -15,6 +15,7 @@
 use super::Stencil;
 use super::block::{Block, Group};
 use super::buffer::{Points, SLACK};
+use super::certain::Certain;
 use super::grid::Grid;
 use super::lanes::{Keys, LANES, Lanes, MOST, Near, Places, Row, TOGETHER};
 use super::neighbours::Reserve;
@@ -89,7 +90,7 @@ pub(super) struct Column<'a, 'j> {
     /// Numbers of the vertices.
     pub(super) vertices: &'a [u32],
     /// Their divergence, 1/m.
-    pub(super) found: &'a mut [Option<f64>],
+    pub(super) found: &'a mut [Certain],
     /// Buffers.
     pub(super) work: &'a mut Workspace,
 }
@@ -167,7 +168,7 @@ fn cell<L: Lanes>(lanes: L, column: &mut Column<'_, '_>, queue: &[(u32, u32)]) {
                     alone = size;
                     continue;
                 }
-                Outcome::Hopeless => column.found[group[0].1 as usize] = job.searched(point(&group[0])),
+                Outcome::Hopeless => column.found[group[0].1 as usize] = job.searched(point(&group[0])).into(),
             }
             alone = alone.saturating_sub(1);
             rest = &rest[size..];
@@ -179,7 +180,7 @@ fn cell<L: Lanes>(lanes: L, column: &mut Column<'_, '_>, queue: &[(u32, u32)]) {
         std::mem::swap(&mut now, &mut later);
     }
     for e in now.iter().chain(&later) {
-        column.found[e.1 as usize] = job.searched(point(e));
+        column.found[e.1 as usize] = job.searched(point(e)).into();
     }
 }
 
@@ -259,7 +260,8 @@ fn together<L: Lanes>(lanes: L, column: &mut Column<'_, '_>, block: &Block, queu
             Some(lanes.sums(job.field, p, &mut work.near, &job.weighting).divergence(offset_m))
         } else {
             None
-        };
+        }
+        .into();
     }
     let share = m2_per / queue.len() as f64;
     work.last_m2 = total.map(|t| (f64::from(t) + 0.5) * share);

@@ -18,6 +18,7 @@ mod avx2;
 mod avx512;
 mod block;
 mod buffer;
+mod certain;
 mod grid;
 mod instruction_set;
 mod kernel;
@@ -29,6 +30,7 @@ mod thresholds;
 mod visits;
 mod weights;
 
+pub use certain::Certain;
 pub use instruction_set::InstructionSet;
 pub use neighbours::{Neighbour, Neighbours};
 
@@ -86,21 +88,11 @@ impl Stencil {
 }
 
 /// Distance from each point to the nearest centroid of the field, metres; none where a centroid beyond
-/// what was loaded could be nearer.
-pub fn nearest_centroid_m(field: &NormalField, points: &[DVec3], side_m: f64) -> Vec<Option<f64>> {
-    nearest_centroid_m_with(field, points, side_m, InstructionSet::best())
-}
-
-/// [`nearest_centroid_m`] with a certain instruction set, which must be available.
-pub fn nearest_centroid_m_with(
-    field: &NormalField,
-    points: &[DVec3],
-    side_m: f64,
-    set: InstructionSet,
-) -> Vec<Option<f64>> {
+/// what was loaded could be nearer. The instruction set must be available.
+pub fn nearest_centroid_m(field: &NormalField, points: &[DVec3], side_m: f64, set: InstructionSet) -> Vec<Certain> {
     let reserve = Reserve::new(field, side_m);
     let Some(sheet) = Sheet::new(field, side_m) else {
-        return points.par_iter().map(|&p| reserve.nearest_m(p, side_m)).collect();
+        return points.par_iter().map(|&p| reserve.nearest_m(p, side_m).into()).collect();
     };
     let visits = Visits::new(sheet.columns(), points, |p| sheet.column(p));
     let job = nearest::Job { sheet: &sheet, field, points, side_m, reserve: &reserve };
@@ -108,24 +100,14 @@ pub fn nearest_centroid_m_with(
 }
 
 /// Divergence of the normal field at each point, 1/m, positive where convex; none where something beyond
-/// what was loaded could change it.
-pub fn divergence(field: &NormalField, points: &[DVec3], stencil: &Stencil) -> Vec<Option<f64>> {
-    divergence_with(field, points, stencil, InstructionSet::best())
-}
-
-/// [`divergence`] with a certain instruction set, which must be available.
-pub fn divergence_with(
-    field: &NormalField,
-    points: &[DVec3],
-    stencil: &Stencil,
-    set: InstructionSet,
-) -> Vec<Option<f64>> {
+/// what was loaded could change it. The instruction set must be available.
+pub fn divergence(field: &NormalField, points: &[DVec3], stencil: &Stencil, set: InstructionSet) -> Vec<Certain> {
     let weighting = Weighting::new(stencil.offset_m, stencil.spacing_m);
     let reserve = Reserve::new(field, stencil.side_m);
     let few = field.centroids.len() < 2 * stencil.neighbours || stencil.neighbours > MOST_NEIGHBOURS;
     let side_m = CELL_REACHES * (stencil.typical_radius_m() + stencil.offset_m);
     let Some(grid) = Some(side_m).filter(|_| !few).and_then(|side_m| Grid::new(field, side_m)) else {
-        return points.par_iter().map(|&p| reserve.divergence(p, stencil, &weighting)).collect();
+        return points.par_iter().map(|&p| reserve.divergence(p, stencil, &weighting).into()).collect();
     };
     let visits = Visits::new(grid.columns(), points, |p| grid.column(p));
     let job = kernel::Job { grid: &grid, field, points, stencil, weighting, reserve: &reserve };
@@ -145,7 +127,7 @@ struct DivergencePass<'a> {
 }
 
 impl Work for DivergencePass<'_> {
-    type Result = Vec<Option<f64>>;
+    type Result = Vec<Certain>;
 
     fn with<L: Lanes>(self, lanes: L) -> Self::Result {
         self.visits.by_column(
@@ -161,7 +143,7 @@ struct NearestPass<'a> {
 }
 
 impl Work for NearestPass<'_> {
-    type Result = Vec<Option<f64>>;
+    type Result = Vec<Certain>;
 
     fn with<L: Lanes>(self, lanes: L) -> Self::Result {
         self.visits.by_run(nearest::COLUMNS, Vec::new, |nearest, columns, found| {

@@ -6,6 +6,7 @@
 //! rounding. A distance is accepted if nothing outside the columns looked at can be nearer.
 #![allow(clippy::needless_range_loop, reason = "vertices run through several arrays at once")]
 
+use super::certain::Certain;
 use super::lanes::Lanes;
 use super::neighbours::{Reserve, distance2};
 use super::sheet::{Entry, Sheet};
@@ -44,7 +45,7 @@ pub(super) struct Run<'a, 'j> {
     /// Numbers of the vertices, by column.
     pub(super) vertices: &'a [u32],
     /// Their distances, metres.
-    pub(super) found: &'a mut [Option<f64>],
+    pub(super) found: &'a mut [Certain],
     /// Buffer: for each vertex the candidate that seems to be nearest.
     pub(super) nearest: &'a mut Vec<u32>,
 }
@@ -128,13 +129,14 @@ fn limit_m(job: &Job<'_>, least_m: f64, p: DVec3) -> f64 {
 /// Exact distances of the nearest candidates. Apart from the search for them, so that the processor waits for many of
 /// them at once.
 #[inline(always)]
-fn settle(job: &Job<'_>, vertices: &[u32], nearest: &[u32], found: &mut [Option<f64>]) {
+fn settle(job: &Job<'_>, vertices: &[u32], nearest: &[u32], found: &mut [Certain]) {
     for ((&v, &t), found) in vertices.iter().zip(nearest).zip(found) {
         let p = job.points[v as usize];
         *found = match job.field.centroids.get(t as usize) {
             Some(&c) => Some(distance2(c, p).sqrt()).filter(|&d| d < job.field.loaded.margin_m(p)),
             None => again(job, p),
-        };
+        }
+        .into();
     }
 }
 

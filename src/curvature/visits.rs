@@ -1,5 +1,6 @@
 //! Points in the order in which they are worked: column by column, many columns at a time.
 
+use super::certain::Certain;
 use crate::geometry::DVec3;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -47,8 +48,8 @@ impl Visits {
     pub(super) fn by_column<S>(
         &self,
         workspace: impl Fn() -> S + Sync + Send,
-        work: impl Fn(&mut S, &[u32], &mut [Option<f64>]) + Sync + Send,
-    ) -> Vec<Option<f64>> {
+        work: impl Fn(&mut S, &[u32], &mut [Certain]) + Sync + Send,
+    ) -> Vec<Certain> {
         self.by_run(COLUMNS, workspace, |state, columns, found| {
             let first = self.start[columns.start] as usize;
             for column in columns {
@@ -70,20 +71,20 @@ impl Visits {
         &self,
         run_columns: usize,
         workspace: impl Fn() -> S + Sync + Send,
-        work: impl Fn(&mut S, Range<usize>, &mut [Option<f64>]) + Sync + Send,
-    ) -> Vec<Option<f64>> {
+        work: impl Fn(&mut S, Range<usize>, &mut [Certain]) + Sync + Send,
+    ) -> Vec<Certain> {
         let columns = self.start.len() - 1;
         let runs = columns.div_ceil(run_columns);
         let of_run = |run: usize| run * run_columns..((run + 1) * run_columns).min(columns);
         // In turns, so that values are not kept twice.
         let turn = TURN * rayon::current_num_threads();
-        let mut values = vec![None; self.order.len()];
+        let mut values = vec![Certain::NONE; self.order.len()];
         for first in (0..runs).step_by(turn) {
             let end = (first + turn).min(runs);
-            let found: Vec<Vec<Option<f64>>> = (first..end)
+            let found: Vec<Vec<Certain>> = (first..end)
                 .into_par_iter()
                 .map_init(&workspace, |state, run| {
-                    let mut found = vec![None; self.of(of_run(run)).len()];
+                    let mut found = vec![Certain::NONE; self.of(of_run(run)).len()];
                     work(state, of_run(run), &mut found);
                     found
                 })

@@ -238,7 +238,7 @@ impl Work<'_> {
             inputs: &columns.triangle_inputs,
             valences: &columns.valences,
         };
-        Ok((vertices, triangles::sort::<I>(&scatter, &ground.grid, shards, &to)?))
+        Ok((vertices, triangles::sort::<I>(&scatter, &ground.grid, (shards, shards_together(shards, room)), &to)?))
     }
 }
 
@@ -263,14 +263,30 @@ const CACHED_VERTICES: u64 = 1 << 15;
 /// More shards than this would leave the disk with pieces that are too small.
 const MOST_CACHED_SHARDS: u64 = 256;
 
+/// Shards for each thread that are worked at a time, at most.
+const MOST_TOGETHER: usize = 8;
+
 /// Vertices of a shard: what half of the memory holds, shared by the threads; fewer where that gives each
 /// thread several to choose from, or where the processor's cache then holds a shard.
 fn shard_vertices(vertices: u64, room: BuildRoom) -> u64 {
     let threads = rayon::current_num_threads() as u64;
-    let width = if room.wide { 2 } else { 1 };
-    let each = vertices::SORTING_BYTES.max(2 * width * triangles::SORTING_BYTES);
+    let each = sorting_bytes(room);
     let cached = CACHED_VERTICES.max(vertices / MOST_CACHED_SHARDS);
     (room.bytes / 2 / threads / each).min(vertices / (4 * threads)).min(cached).max(LEAST_VERTICES)
+}
+
+/// Bytes that a vertex of a shard takes while it is sorted with its triangles, or by itself.
+fn sorting_bytes(room: BuildRoom) -> u64 {
+    let width = if room.wide { 2 } else { 1 };
+    vertices::SORTING_BYTES.max(2 * width * triangles::SORTING_BYTES)
+}
+
+/// Shards whose triangles are worked at a time: one for each thread, and more where half of the memory holds them, since
+/// threads wait for one another at their end.
+fn shards_together(shards: &[shards::Shard], room: BuildRoom) -> usize {
+    let threads = rayon::current_num_threads();
+    let largest = shards.iter().map(|s| s.vertices.end - s.vertices.start).max().unwrap_or(0).max(1);
+    ((room.bytes / 2 / sorting_bytes(room) / largest) as usize).clamp(threads, MOST_TOGETHER * threads)
 }
 
 /// Sums over all triangles, and what they give.

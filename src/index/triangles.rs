@@ -62,11 +62,11 @@ struct Prepared<I> {
 /// Sorts the triangles into the columns.
 ///
 /// Triangles get their numbers by the cell of their centroid, row by row, then by their vertices' numbers,
-/// then by their place in the input.
+/// then by their place in the input. `together` shards are worked at a time.
 pub(super) fn sort<I: Id>(
     scatter: &Scatter<[I; 4]>,
     grid: &CellGrid,
-    shards: &[Shard],
+    (shards, together): (&[Shard], usize),
     to: &Sorted,
 ) -> Result<SortedTriangles, StoreError> {
     let mut start = Vec::with_capacity(grid.len() + 1);
@@ -75,7 +75,7 @@ pub(super) fn sort<I: Id>(
     let mut written = Vec::with_capacity(shards.len());
     let of_rows = of_rows(shards);
     let mut arriving: Vec<Arriving<I>> = vec![Arriving::default(); shards.len()];
-    for wave in (0..shards.len()).collect::<Vec<_>>().chunks(rayon::current_num_threads()) {
+    for wave in (0..shards.len()).collect::<Vec<_>>().chunks(together) {
         let mut prepared = wave
             .par_iter()
             .with_max_len(1)

@@ -1,7 +1,7 @@
 //! One number for every vertex: spacing and curvature.
 
 use super::{Survey, TileError};
-use crate::curvature::{Stencil, divergence_with, nearest_centroid_m_with};
+use crate::curvature::{Certain, Stencil, divergence, nearest_centroid_m};
 use crate::geometry::{DVec3, ExactSum};
 use crate::index::{CellBlock, Index};
 use crate::pipeline::{Crew, Interrupted, LostJob, Reservation, Stages, Stopped, over_jobs};
@@ -12,7 +12,7 @@ use std::convert::Infallible;
 use std::ops::Range;
 
 /// A value at each point, or none where something beyond the field could change it.
-type PointValues<'f> = dyn Fn(&NormalField, &[DVec3]) -> Vec<Option<f64>> + Sync + 'f;
+type PointValues<'f> = dyn Fn(&NormalField, &[DVec3]) -> Vec<Certain> + Sync + 'f;
 
 /// How the field of a block is loaded.
 type Load = fn(&Index, &CellBlock) -> Result<NormalField, StoreError>;
@@ -38,7 +38,7 @@ impl Survey<'_> {
         let side_m = self.index.scale.mean_triangle_area_m2.sqrt();
         let mut sum = ExactSum::ZERO;
         let nearest =
-            |field: &NormalField, points: &[DVec3]| nearest_centroid_m_with(field, points, side_m, self.instructions);
+            |field: &NormalField, points: &[DVec3]| nearest_centroid_m(field, points, side_m, self.instructions);
         let stages = Stages {
             footprint_bytes: |job| self.field_bytes(job, 3.0 * side_m),
             work: |job, reservation: &mut Reservation| {
@@ -73,7 +73,7 @@ impl Survey<'_> {
         progress: &dyn Progress,
         mut collect: impl FnMut(usize, CoreValues) -> Result<(), C>,
     ) -> Result<Vec<LostJob>, Stopped<C>> {
-        let values = |field: &NormalField, points: &[DVec3]| divergence_with(field, points, stencil, self.instructions);
+        let values = |field: &NormalField, points: &[DVec3]| divergence(field, points, stencil, self.instructions);
         let stages = Stages {
             footprint_bytes: |job| self.field_bytes(job, stencil.reach_m()),
             work: |job, reservation: &mut Reservation| {
@@ -113,7 +113,7 @@ impl Survey<'_> {
         let mut found = values(&field, &points);
         drop(field);
         let mut wider_m = halo_m;
-        while found.contains(&None) {
+        while !found.iter().all(|value| value.is_known()) {
             wider_m = 2.0 * wider_m.max(index.grid.cell_m);
             let block = self.with_halo(core, wider_m);
             reservation
@@ -121,12 +121,12 @@ impl Survey<'_> {
                 .map_err(|over| TileError::TooWide { halo_m: wider_m, over })?;
             let field = load(index, &block)?;
             loaded += field.centroids.len() as u64;
-            let open: Vec<usize> = (0..found.len()).filter(|&i| found[i].is_none()).collect();
+            let open: Vec<usize> = (0..found.len()).filter(|&i| !found[i].is_known()).collect();
             let again: Vec<DVec3> = open.iter().map(|&i| points[i]).collect();
             for (i, value) in open.into_iter().zip(values(&field, &again)) {
                 found[i] = value;
             }
         }
-        Ok(CoreValues { runs, values: found.into_iter().flatten().collect(), loaded })
+        Ok(CoreValues { runs, values: found.into_iter().filter_map(Certain::value).collect(), loaded })
     }
 }

@@ -29,6 +29,7 @@ use crate::settings::Settings;
 use crate::store::{Ledger, Shelf, StoreError, fail_point};
 use crate::tile::CoreSize;
 use identity::Identity;
+use rayon::prelude::*;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
@@ -233,7 +234,13 @@ impl WorkFolder {
 
     /// Removes a part that nobody needs. Nothing is lost if some of it stays.
     fn remove(&self, part: &str) {
-        let _ = std::fs::remove_dir_all(self.shelf.path(part));
+        let path = self.shelf.path(part);
+        let files: Vec<PathBuf> = std::fs::read_dir(&path).into_iter().flatten().flatten().map(|f| f.path()).collect();
+        // Large files take a while to go.
+        files.into_par_iter().with_max_len(1).for_each(|file| {
+            let _ = std::fs::remove_file(file);
+        });
+        let _ = std::fs::remove_dir_all(path);
     }
 
     /// Removes the folder, unless others put something there.

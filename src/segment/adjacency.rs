@@ -118,10 +118,8 @@ mod tests {
 
     #[test]
     fn an_edge_knows_all_its_triangles_whatever_their_winding() {
-        let adjacency = Adjacency::of(&Bands::of(&mesh(
-            &[[0, 1, 2], [2, 1, 3], [1, 2, 4], [0, 0, 3], [3, 4, 1]],
-            &[true; 5],
-        )));
+        let adjacency =
+            Adjacency::of(&Bands::of(&mesh(&[[0, 1, 2], [2, 1, 3], [1, 2, 4], [0, 0, 3], [3, 4, 1]], &[true; 5])));
         assert_eq!(adjacency.forks().collect::<Vec<_>>(), [[0, 1, 2]]);
         let sides: Vec<_> = (0..5).map(|t| adjacency.sides(t)).collect();
         assert_eq!(sides, [[0, 0, 0], [1, 4, 1], [2, 2, 4], [3, 3, 3], [4, 2, 1]]);

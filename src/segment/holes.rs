@@ -64,7 +64,8 @@ fn merge(a: u32, b: u32) -> u32 {
 
 /// The only body that touches each vertex ([`NONE`], or [`SEVERAL`]), [`UNSURE`] if that is not certain.
 fn contacts(bands: &Bands, labels: &Labels) -> Vec<u32> {
-    let mut touching: Vec<u32> = bands.mesh.complete.par_iter().map(|&c| if c { NONE } else { NONE | UNSURE }).collect();
+    let mut touching: Vec<u32> =
+        bands.mesh.complete.par_iter().map(|&c| if c { NONE } else { NONE | UNSURE }).collect();
     let adds = |t: usize| match labels.state[t] {
         State::Kept => Some(labels.label[t]),
         State::Unknown => Some(NONE | UNSURE),

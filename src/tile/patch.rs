@@ -93,10 +93,13 @@ pub(super) fn each_triangle(index: &Index, block: &CellBlock, to: &mut impl Take
     Ok(())
 }
 
+/// Vertices outside a block, piece by piece of its triangles in the order in which they were met.
+type Met = Vec<Vec<u64>>;
+
 /// Corners of the triangles as local numbers, piece by piece on all threads: those of `inside`, and behind them, in
 /// the order in which a piece meets them, each time anew, those outside, which are returned for each piece by their
 /// survey numbers.
-fn corners(index: &Index, triangles: &Runs, inside: &Runs) -> Result<(Vec<[u32; 3]>, Vec<Vec<u64>>), StoreError> {
+fn corners(index: &Index, triangles: &Runs, inside: &Runs) -> Result<(Vec<[u32; 3]>, Met), StoreError> {
     let mut corners = vec![[0; 3]; triangles.len()];
     let read = |(piece, corners): (usize, &mut [[u32; 3]])| {
         let mut outside = Vec::new();
@@ -117,12 +120,12 @@ fn corners(index: &Index, triangles: &Runs, inside: &Runs) -> Result<(Vec<[u32; 
         }
         Ok(outside)
     };
-    let outside: Result<Vec<Vec<u64>>, StoreError> = corners.par_chunks_mut(PIECE).enumerate().map(read).collect();
+    let outside: Result<Met, StoreError> = corners.par_chunks_mut(PIECE).enumerate().map(read).collect();
     Ok((corners, outside?))
 }
 
 /// Puts the vertices outside into their places, so that local numbers ascend with those of the survey.
-fn with_outside(inside: &Runs, met: &[Vec<u64>], corners: &mut [[u32; 3]]) -> Runs {
+fn with_outside(inside: &Runs, met: &Met, corners: &mut [[u32; 3]]) -> Runs {
     let mut outside = met.concat();
     if outside.is_empty() {
         return inside.clone();

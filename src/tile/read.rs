@@ -29,8 +29,7 @@ pub fn read_of<T: Element + Default>(column: &Column<T>, runs: &Runs) -> Result<
 fn read_ranges<T: Element>(column: &Column<T>, mut rest: &[Range<u64>], mut to: &mut [T]) -> Result<(), StoreError> {
     let mut through = Vec::new();
     while let Some(first) = rest.first() {
-        let joins =
-            |w: &&[Range<u64>]| w[1].start - w[0].end <= READ_THROUGH && w[1].end - first.start <= PIECE as u64;
+        let joins = |w: &&[Range<u64>]| w[1].start - w[0].end <= READ_THROUGH && w[1].end - first.start <= PIECE as u64;
         let (together, after) = rest.split_at(rest.windows(2).take_while(joins).count() + 1);
         rest = after;
         let count = |ranges: &[Range<u64>]| ranges.iter().map(|r| r.end - r.start).sum::<u64>() as usize;
