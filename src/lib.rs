@@ -40,6 +40,7 @@ pub mod store;
 
 pub mod cli;
 pub mod costs;
+pub mod cuts;
 pub mod demo;
 pub mod error;
 pub mod forecast;

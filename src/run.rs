@@ -2,15 +2,16 @@
 
 use crate::costs::{Costs, Meter};
 use crate::curvature::{InstructionSet, Stencil};
+use crate::cuts::{GrainCores, curvature_core, grain_cores};
 use crate::error::Error;
 use crate::forecast;
 use crate::index::{BuildRoom, Index};
 use crate::measure::Wanted;
 use crate::open::Reach;
 use crate::passes::{Probe, Recipe, Survey};
-use crate::pipeline::{Budget, Control, Crew, LostJob, memory_there_bytes};
+use crate::pipeline::{Budget, Control, Crew, LostJob, beside, memory_there_bytes};
 use crate::progress::{Progress, Unit};
-use crate::resume::{ResumeError, WORK, WorkFolder, changes_since_finished, whole_identity};
+use crate::resume::{Curvature, ResumeError, WORK, WorkFolder, changes_since_finished, whole_identity};
 use crate::segment::smallest_grain_area_m2;
 use crate::settings::{Instructions, Settings};
 use crate::statistics::RasterGrid;
@@ -105,8 +106,11 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
 
     // index
     let room = forecast::room(&reach, memory)?;
+    let budget = (room.bytes, forecast::fixed_bytes(&reach));
     let crew = Crew { pool, budget: Budget::strict(room.bytes), control: control.clone() };
-    let mut index = match work.index(&reach)? {
+    let kept = work.index(&reach)?;
+    let made = kept.is_none();
+    let mut index = match kept {
         Some(index) => index,
         None => {
             let disk = forecast::disk(&reach, room, &work.path().display().to_string(), work.free_bytes())?;
@@ -115,40 +119,30 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
         }
     };
     control.check()?;
-    check_outputs(&reach, &index, settings)?;
 
-    // plan
-    let mut curvature = work.curvature(&reach, &index, settings)?;
-    let core = forecast::curvature_core(&index, settings, threads, room.bytes);
-    let vertex_plan = Plan::new(&index, curvature.core(core)?);
-    let budget = (room.bytes, forecast::fixed_bytes(&reach));
-    let cores = forecast::grain_cores(&index, settings, threads, room.bytes);
-    let plan = Plan::new(&index, cores.largest);
-    let tiles_bytes =
-        forecast::tiles_bytes(&Survey { index: &index, plan: &plan, instructions }, settings, threads, budget)?;
-    progress.note(&format!(
-        "{} tiles{} of {:.3} x {:.3} m, {threads} threads; peak memory about {} MiB of {} MiB",
-        plan.tiles.len(),
-        if cores.divisible { " or more" } else { "" },
-        plan.core_m(&index)[0],
-        plan.core_m(&index)[1],
-        (tiles_bytes + forecast::fixed_bytes(&reach)) >> 20,
-        memory >> 20
-    ));
+    // plan, and tile by tile: spacing; the disk takes the index meanwhile
+    let keep = || if made { work.keep_index(&reach, &index) } else { Ok(()) };
+    let (kept, planned) = beside(keep, || {
+        check_outputs(&reach, &index, settings)?;
+        let mut curvature = work.curvature(&reach, &index, settings)?;
+        let plans = plans(&index, &mut curvature, settings, (threads, budget), progress)?;
+        let survey = Survey { index: &index, plan: &plans.vertices, instructions };
+        let spacing_m = curvature.spacing_m(|| spacing_m(&survey, &crew, progress))?;
+        Ok::<_, Error>((curvature, plans, spacing_m))
+    });
+    kept?;
+    let (mut curvature, plans, spacing_m) = planned?;
+    index.scale.spacing_m = spacing_m;
 
-    // tile by tile: spacing, curvature
-    index.scale.spacing_m = curvature.spacing_m(|| {
-        let (spacing_m, lost) = Survey { index: &index, plan: &vertex_plan, instructions }.spacing(&crew, progress)?;
-        none_lost("spacing", lost).map(|()| spacing_m)
-    })?;
+    // tile by tile: curvature
     let stencil = Stencil::new(index.scale.spacing_m, index.scale.mean_triangle_area_m2, &settings.curvature);
-    let survey = Survey { index: &index, plan: &vertex_plan, instructions };
-    let jobs = curvature.missing(&index, &vertex_plan)?;
+    let survey = Survey { index: &index, plan: &plans.vertices, instructions };
+    let jobs = curvature.missing(&index, &plans.vertices)?;
     let (mut loaded, mut owned) = (0, 0);
     let lost = survey.divergence(&crew, &jobs, &stencil, progress, |job, core| {
         loaded += core.loaded;
         owned += survey.owned_triangles(job);
-        curvature.add(vertex_plan.tiles[job].id, &core.runs, &core.values)
+        curvature.add(plans.vertices.tiles[job].id, &core.runs, &core.values)
     })?;
     none_lost("curvature", lost)?;
     curvature.sync()?;
@@ -158,12 +152,12 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let wanted = Wanted { outline_step_m, triangle_ids: settings.output.labelled_mesh };
     let recipe =
         Recipe { settings: &settings.segment, divergence: curvature.divergence(), wanted, usual_width_m: None };
-    let probe = match cores.divisible || plan.tiles.len() > 1 {
+    let probe = match plans.cores.divisible || plans.grains.tiles.len() > 1 {
         true => crew.pool.install(|| survey.probe(&recipe))?,
         false => Probe::default(),
     };
     let recipe = Recipe { usual_width_m: probe.usual_width_m, ..recipe };
-    let plan = Plan::new(&index, findings.core(cores.size(&index, threads, probe.usual_width_m))?);
+    let plan = Plan::new(&index, findings.core(plans.cores.size(&index, threads, probe.usual_width_m))?);
     let survey = Survey { index: &index, plan: &plan, instructions };
     // An interrupted run may have had more memory, and larger tiles.
     forecast::tiles_bytes(&survey, settings, threads, budget)?;
@@ -204,7 +198,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let files = write(&folder, &results, progress, control)?;
     if lost.is_empty() {
         drop((index, curvature, findings));
-        crew.pool.install(|| work.finish());
+        work.finish();
     }
     let (triangles, costs) = (reach.triangles(), meter.costs());
     Ok(Outcome { files, catalogue, lost, segmented_per_triangle, curvature_per_triangle, triangles, costs })
@@ -251,10 +245,51 @@ fn make_index(
     progress: &dyn Progress,
 ) -> Result<Index, Error> {
     progress.begin("index", reach.triangles(), Unit::Triangles);
-    let index = crew.pool.install(|| work.make_index(reach, |shelf| Index::build(reach, shelf, room)))?;
+    let index = crew.pool.install(|| work.make_index(|shelf| Index::build(reach, shelf, room)))?;
     progress.advance(reach.triangles());
     progress.end();
     Ok(index)
+}
+
+/// How a survey is cut.
+struct Plans {
+    /// Into tiles of the passes that store one number for each vertex.
+    vertices: Plan,
+    /// Into the fewest tiles of the grain pass.
+    grains: Plan,
+    /// What is known of these.
+    cores: GrainCores,
+}
+
+/// `budget` is the memory for tiles and what else is taken, bytes.
+fn plans(
+    index: &Index,
+    curvature: &mut Curvature,
+    settings: &Settings,
+    (threads, budget): (usize, (u64, u64)),
+    progress: &dyn Progress,
+) -> Result<Plans, Error> {
+    let core = curvature_core(index, settings, threads, budget.0);
+    let vertices = Plan::new(index, curvature.core(core)?);
+    let cores = grain_cores(index, settings, threads, budget.0);
+    let grains = Plan::new(index, cores.largest);
+    let survey = Survey { index, plan: &grains, instructions: InstructionSet::best() };
+    let tiles_bytes = forecast::tiles_bytes(&survey, settings, threads, budget)?;
+    progress.note(&format!(
+        "{} tiles{} of {:.3} x {:.3} m, {threads} threads; peak memory about {} MiB of {} MiB",
+        grains.tiles.len(),
+        if cores.divisible { " or more" } else { "" },
+        grains.core_m(index)[0],
+        grains.core_m(index)[1],
+        (tiles_bytes + budget.1) >> 20,
+        (budget.0 + budget.1) >> 20
+    ));
+    Ok(Plans { vertices, grains, cores })
+}
+
+fn spacing_m(survey: &Survey, crew: &Crew, progress: &dyn Progress) -> Result<f64, Error> {
+    let (spacing_m, lost) = survey.spacing(crew, progress)?;
+    none_lost("spacing", lost).map(|()| spacing_m)
 }
 
 fn open(job: &Job, progress: &dyn Progress) -> Result<(Reach, Vec<crate::open::Warning>), Error> {

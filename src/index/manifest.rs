@@ -6,7 +6,6 @@ use super::identity::Numbers;
 use super::seal::Seal;
 use super::{COLORS, CORNERS, Columns, Index, POSITIONS, Scale, TRIANGLE_INPUTS, VALENCES, VERTEX_INPUTS};
 use crate::store::{Column, Shelf, StoreError, fail_point};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::hash::Hasher;
 use std::path::Path;
@@ -46,16 +45,14 @@ impl Index {
             column.sync()?;
         }
         let columns = &self.columns;
-        // The largest first; while the disk has one, the next is got ready for it.
-        let syncs: [&(dyn Fn() -> Result<(), StoreError> + Sync); 6] = [
-            &|| columns.corners.sync(),
-            &|| columns.positions.sync(),
-            &|| columns.triangle_inputs.sync(),
-            &|| columns.vertex_inputs.sync(),
-            &|| columns.colors.as_ref().map_or(Ok(()), Colors::sync),
-            &|| columns.valences.sync(),
-        ];
-        syncs.into_par_iter().with_max_len(1).try_for_each(|sync| sync())?;
+        columns.positions.sync()?;
+        columns.valences.sync()?;
+        columns.corners.sync()?;
+        columns.vertex_inputs.sync()?;
+        columns.triangle_inputs.sync()?;
+        if let Some(colors) = &columns.colors {
+            colors.sync()?;
+        }
         let manifest = Manifest {
             format: FORMAT,
             identity: identity.to_owned(),

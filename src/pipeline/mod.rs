@@ -7,6 +7,9 @@
 //!   a job's bytes    free the bytes
 //! ```
 //!
+//! A worker without a job helps inside those of others, so that one job at a time keeps all threads busy where
+//! memory holds no more.
+//!
 //! One thread or many, the caller sees the same results in the same order.
 
 mod budget;
@@ -17,11 +20,12 @@ pub use budget::{Budget, OverBudget, Reservation};
 pub use control::{Cancelled, Control, Interrupted};
 pub use machine::{cpu_seconds, memory_there_bytes, peak_memory_bytes};
 
-use crossbeam_channel::{Receiver, Sender, bounded};
+use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, TryRecvError, bounded};
 use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 /// What a pipeline needs of the machine.
 pub struct Crew {
@@ -63,6 +67,18 @@ pub struct Stages<F, W> {
     pub footprint_bytes: F,
     /// Fetches a job's data and does the work. The reservation may be grown when a job turns out larger.
     pub work: W,
+}
+
+/// Does something that waits for the disk beside work, and gives both results.
+///
+/// # Panics
+/// When either does.
+pub fn beside<A: Send, B>(aside: impl FnOnce() -> A + Send, work: impl FnOnce() -> B) -> (A, B) {
+    std::thread::scope(|scope| {
+        let aside = scope.spawn(aside);
+        let done = work();
+        (aside.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)), done)
+    })
 }
 
 /// Runs the given jobs and hands each result to `collect`, in their order.
@@ -136,7 +152,7 @@ fn work_all<R, E: Display>(
     go_on: &impl Fn() -> bool,
     stages: &Stages<impl Fn(usize) -> u64, impl Fn(usize, &mut Reservation) -> Result<R, E>>,
 ) {
-    for (job, mut reservation) in from {
+    while let Some((job, mut reservation)) = next_job(from) {
         if !go_on() {
             return;
         }
@@ -144,6 +160,25 @@ fn work_all<R, E: Display>(
         drop(reservation);
         if to.send((job, result)).is_err() {
             return;
+        }
+    }
+}
+
+/// How long a worker waits for a job before it looks again whether it can help.
+const PAUSE: Duration = Duration::from_micros(500);
+
+/// The next job; none when there will be no more. Until there is one, helps the other threads of the pool.
+fn next_job<J>(from: &Receiver<J>) -> Option<J> {
+    loop {
+        match from.try_recv() {
+            Ok(job) => return Some(job),
+            Err(TryRecvError::Disconnected) => return None,
+            Err(TryRecvError::Empty) if rayon::yield_now() == Some(rayon::Yield::Executed) => {}
+            Err(TryRecvError::Empty) => match from.recv_timeout(PAUSE) {
+                Ok(job) => return Some(job),
+                Err(RecvTimeoutError::Disconnected) => return None,
+                Err(RecvTimeoutError::Timeout) => {}
+            },
         }
     }
 }

@@ -29,7 +29,6 @@ use crate::settings::Settings;
 use crate::store::{Ledger, Shelf, StoreError, fail_point};
 use crate::tile::CoreSize;
 use identity::Identity;
-use rayon::prelude::*;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
@@ -191,20 +190,23 @@ impl WorkFolder {
         Ok(Index::open(&self.shelf.inner(INDEX)?, &Identity::of_survey(reach).text()))
     }
 
-    /// Makes the index of the survey and keeps it.
+    /// Makes the index of the survey.
     ///
     /// # Errors
     /// As [`Index::build`].
-    pub fn make_index(
-        &self,
-        reach: &Reach,
-        build: impl FnOnce(&Shelf) -> Result<Index, IndexError>,
-    ) -> Result<Index, Error> {
+    pub fn make_index(&self, build: impl FnOnce(&Shelf) -> Result<Index, IndexError>) -> Result<Index, Error> {
         let shelf = self.shelf.inner(INDEX)?;
         Index::forget(&shelf);
-        let index = build(&shelf)?;
-        index.keep(&shelf, &Identity::of_survey(reach).text())?;
-        Ok(index)
+        Ok(build(&shelf)?)
+    }
+
+    /// Waits until the disk has the index, from where on a later run finds it. What cannot be kept is removed.
+    ///
+    /// # Errors
+    /// The disk says no.
+    pub fn keep_index(&self, reach: &Reach, index: &Index) -> Result<(), StoreError> {
+        let keep = |shelf: &Shelf| index.keep(shelf, &Identity::of_survey(reach).text());
+        self.shelf.inner(INDEX).and_then(|shelf| keep(&shelf)).inspect_err(|_| self.remove(INDEX))
     }
 
     /// Spacing and divergence, as far as they are there.
@@ -234,13 +236,7 @@ impl WorkFolder {
 
     /// Removes a part that nobody needs. Nothing is lost if some of it stays.
     fn remove(&self, part: &str) {
-        let path = self.shelf.path(part);
-        let files: Vec<PathBuf> = std::fs::read_dir(&path).into_iter().flatten().flatten().map(|f| f.path()).collect();
-        // Large files take a while to go.
-        files.into_par_iter().with_max_len(1).for_each(|file| {
-            let _ = std::fs::remove_file(file);
-        });
-        let _ = std::fs::remove_dir_all(path);
+        let _ = std::fs::remove_dir_all(self.shelf.path(part));
     }
 
     /// Removes the folder, unless others put something there.
