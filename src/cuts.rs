@@ -2,7 +2,7 @@
 
 use crate::curvature::InstructionSet;
 use crate::index::Index;
-use crate::passes::Survey;
+use crate::passes::{Survey, tiles_at_once};
 use crate::settings::Settings;
 use crate::tile::{CoreSize, NormalField, Plan, TileMesh};
 
@@ -13,6 +13,9 @@ const LARGEST_CURVATURE_CORE: f64 = 5e5;
 pub(crate) const LARGEST_CORE: f64 = 5e7;
 /// Triangles of a core of the grain pass with its halos, for each of the core, where nothing is known of the grains.
 const WITH_WIDE_HALO: f64 = 1.6;
+/// Share of the memory that the tiles of a survey that is cut are made for: the rest is for second looks, for what was
+/// found, and for what the allocator keeps. So peaks are alike for surveys of all sizes.
+const SHARE_OF_CUT: f64 = 0.875;
 /// Triangles of a curvature core with its halo, for each of the core.
 const WITH_HALO: f64 = 1.1;
 /// Widths of a grain that are worked once more along a border between two cores, halos and second looks together.
@@ -21,9 +24,6 @@ const WIDTHS_AT_BORDER: f64 = 7.0;
 /// Work in halos, for each triangle of the survey, up to which it is cut into more tiles than memory asks for. The
 /// loops within a tile run on all threads as well, so that more would be gained for the clock alone.
 const WORTH_A_CUT: f64 = 0.2;
-/// Threads that a tile of the grain pass keeps busy by itself: so many fewer tiles need to be in memory, and larger ones
-/// repeat less in their halos. Two were measured.
-const THREADS_OF_A_TILE: usize = 4;
 /// Survey that is not cut for the sake of threads, triangles: to look how wide its grains are would cost too much.
 const LEAST_TO_CUT: u64 = 8_000_000;
 
@@ -53,13 +53,14 @@ pub fn grain_cores(index: &Index, settings: &Settings, threads: usize, memory: u
         return GrainCores { largest: CoreSize::square(index, settings.work.tile_size_m), divisible: false };
     }
     let triangles = index.scale.triangles;
-    let Cuts { mut least, divisible } = Cuts::of(triangles, threads, memory);
+    let at_once = tiles_at_once(threads);
+    let Cuts { mut least, divisible } = Cuts::of(triangles, at_once, memory);
     loop {
-        let largest = CoreSize::holding(index, triangles as f64 / least, threads);
+        let largest = CoreSize::holding(index, triangles as f64 / least, at_once);
         let plan = Plan::new(index, largest);
         let survey = Survey { index, plan: &plan, instructions: InstructionSet::best() };
         // The halos of small cores are wider than the rest of them.
-        let fits = survey.largest_bytes(&settings.segment) <= memory;
+        let fits = survey.largest_bytes(&settings.segment) as f64 <= SHARE_OF_CUT * memory as f64;
         if fits || least == 1.0 || (largest.columns, largest.rows) == (1, 1) {
             return GrainCores { largest, divisible };
         }
@@ -77,28 +78,29 @@ struct Cuts {
 }
 
 impl Cuts {
-    fn of(triangles: u64, threads: usize, memory: u64) -> Cuts {
+    fn of(triangles: u64, at_once: usize, memory: u64) -> Cuts {
         let all = TileMesh::footprint_bytes(triangles) as f64 / memory as f64;
         if all <= 1.0 && triangles as f64 <= LARGEST_CORE {
             // Halos must fit as well if it is cut.
-            let divisible = threads > 1 && triangles >= LEAST_TO_CUT && all * WITH_WIDE_HALO <= 1.0;
+            let divisible = at_once > 1 && triangles >= LEAST_TO_CUT && all * WITH_WIDE_HALO <= 1.0;
             return Cuts { least: 1.0, divisible };
         }
-        let by_memory = all * WITH_WIDE_HALO * threads.div_ceil(THREADS_OF_A_TILE) as f64;
+        let by_memory = all / SHARE_OF_CUT * WITH_WIDE_HALO * at_once as f64;
         Cuts { least: by_memory.max(triangles as f64 / LARGEST_CORE).max(2.0), divisible: false }
     }
 }
 
 impl GrainCores {
-    /// The size of cores where most grains are not wider than `usual_width_m`: as small as gives every thread a tile,
+    /// The size of cores where most grains are not wider than `usual_width_m`: as small as keeps all threads busy,
     /// if what is then worked in halos is little.
     pub fn size(&self, index: &Index, threads: usize, usual_width_m: Option<f64>) -> CoreSize {
         let Some(width_m) = usual_width_m.filter(|_| self.divisible) else { return self.largest };
         let width_cells = width_m / index.grid.cell_m;
         let triangles = index.scale.triangles as f64;
-        (2..=threads)
+        let at_once = tiles_at_once(threads);
+        (2..=at_once)
             .rev()
-            .map(|tiles| CoreSize::holding(index, triangles / tiles as f64, threads))
+            .map(|tiles| CoreSize::holding(index, triangles / tiles as f64, at_once))
             .filter(|size| size.columns <= self.largest.columns && size.rows <= self.largest.rows)
             .find(|size| WIDTHS_AT_BORDER * width_cells * size.border(&index.grid) <= WORTH_A_CUT)
             .unwrap_or(self.largest)
@@ -113,10 +115,11 @@ mod tests {
 
     #[test]
     fn a_survey_is_cut_only_where_memory_or_the_cost_of_a_crash_asks_for_it() {
-        let cuts = |triangles: u64, threads, memory| Cuts::of(triangles, threads, memory);
+        let cuts = |triangles: u64, threads, memory| Cuts::of(triangles, tiles_at_once(threads), memory);
         assert_eq!(cuts(1_000_000, 2, GIB), Cuts { least: 1.0, divisible: false });
         assert_eq!(cuts(10_000_000, 1, GIB), Cuts { least: 1.0, divisible: false });
-        assert_eq!(cuts(10_000_000, 2, 2 * GIB), Cuts { least: 1.0, divisible: true });
+        assert_eq!(cuts(10_000_000, 2, 2 * GIB), Cuts { least: 1.0, divisible: false });
+        assert_eq!(cuts(10_000_000, 8, 2 * GIB), Cuts { least: 1.0, divisible: true });
         // Whole it fits, with halos it would not.
         assert_eq!(cuts(14_000_000, 2, GIB), Cuts { least: 1.0, divisible: false });
         assert_eq!(cuts(0, 8, GIB), Cuts { least: 1.0, divisible: false });
@@ -124,7 +127,7 @@ mod tests {
         assert_eq!(cuts(2_000_000_000, 1, 1000 * GIB).least, 40.0);
         for (triangles, threads, memory) in [(100_000_000, 2, GIB), (100_000_000, 64, 8 * GIB), (15_000_000, 1, GIB)] {
             let tile = triangles as f64 / cuts(triangles, threads, memory).least;
-            let at_once = (threads as u64).div_ceil(THREADS_OF_A_TILE as u64);
+            let at_once = tiles_at_once(threads) as u64;
             let bytes = TileMesh::footprint_bytes((tile * WITH_WIDE_HALO) as u64) * at_once;
             assert!(bytes <= memory && !cuts(triangles, threads, memory).divisible, "{triangles}: {bytes} of {memory}");
         }

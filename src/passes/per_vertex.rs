@@ -40,6 +40,7 @@ impl Survey<'_> {
         let nearest =
             |field: &NormalField, points: &[DVec3]| nearest_centroid_m(field, points, side_m, self.instructions);
         let stages = Stages {
+            at_once: crew.pool.current_num_threads(),
             footprint_bytes: |job| self.field_bytes(job, 3.0 * side_m),
             work: |job, reservation: &mut Reservation| {
                 let core = self.of_core(job, 3.0 * side_m, (NormalField::load_centroids, &nearest), reservation)?;
@@ -75,6 +76,7 @@ impl Survey<'_> {
     ) -> Result<Vec<LostJob>, Stopped<C>> {
         let values = |field: &NormalField, points: &[DVec3]| divergence(field, points, stencil, self.instructions);
         let stages = Stages {
+            at_once: crew.pool.current_num_threads(),
             footprint_bytes: |job| self.field_bytes(job, stencil.reach_m()),
             work: |job, reservation: &mut Reservation| {
                 self.of_core(job, stencil.reach_m(), (NormalField::load, &values), reservation)

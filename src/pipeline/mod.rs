@@ -3,8 +3,8 @@
 //!
 //! ```text
 //!  dispatcher ──rendezvous──> workers (the pool's threads) ──bounded──> caller, in the jobs' order
-//!    waits for    may use the pool inside;
-//!   a job's bytes    free the bytes
+//!   waits for a slot     may use the pool inside;
+//!  and a job's bytes     free both
 //! ```
 //!
 //! A worker without a job helps inside those of others, so that one job at a time keeps all threads busy where
@@ -63,6 +63,8 @@ pub struct LostJob {
 
 /// The two closures of a pipeline.
 pub struct Stages<F, W> {
+    /// Jobs in flight, at most.
+    pub at_once: usize,
     /// Bytes that a job takes while it is in flight.
     pub footprint_bytes: F,
     /// Fetches a job's data and does the work. The reservation may be grown when a job turns out larger.
@@ -95,6 +97,7 @@ pub fn over_jobs<R: Send, E: Display, C>(
     mut collect: impl FnMut(usize, R) -> Result<(), C>,
 ) -> Result<Vec<LostJob>, Stopped<C>> {
     let workers = crew.pool.current_num_threads();
+    let (slot_taken, slot_free) = bounded::<()>(stages.at_once);
     let (given_in, given_out) = bounded::<(usize, Reservation)>(0);
     let (done_in, done_out) = bounded::<(usize, Result<R, LostJob>)>(workers);
     let mut lost = Vec::new();
@@ -106,6 +109,8 @@ pub fn over_jobs<R: Send, E: Display, C>(
         scope.spawn(|| {
             let given_in = given_in;
             for &job in jobs {
+                // Both ends of the slots outlive this: they can always be taken and given back.
+                let _ = slot_taken.send(());
                 let Ok(reservation) = crew.budget.reserve((stages.footprint_bytes)(job), &crew.control) else { return };
                 // The workers are gone only when they were stopped.
                 if !go_on() || given_in.send((job, reservation)).is_err() {
@@ -116,7 +121,7 @@ pub fn over_jobs<R: Send, E: Display, C>(
         let from = given_out;
         scope.spawn(|| {
             let (from, done_in) = (from, done_in);
-            crew.pool.broadcast(|_| work_all(&from, &done_in, &go_on, stages));
+            crew.pool.broadcast(|_| work_all(&from, &done_in, &slot_free, &go_on, stages));
         });
         // Results arrive in any order; those that are early wait here.
         let mut early = BTreeMap::new();
@@ -149,15 +154,18 @@ pub fn over_jobs<R: Send, E: Display, C>(
 fn work_all<R, E: Display>(
     from: &Receiver<(usize, Reservation)>,
     to: &Sender<(usize, Result<R, LostJob>)>,
+    slots: &Receiver<()>,
     go_on: &impl Fn() -> bool,
     stages: &Stages<impl Fn(usize) -> u64, impl Fn(usize, &mut Reservation) -> Result<R, E>>,
 ) {
     while let Some((job, mut reservation)) = next_job(from) {
         if !go_on() {
+            let _ = slots.recv();
             return;
         }
         let result = guarded(job, || (stages.work)(job, &mut reservation));
         drop(reservation);
+        let _ = slots.recv();
         if to.send((job, result)).is_err() {
             return;
         }
@@ -211,6 +219,7 @@ mod tests {
     fn squares(crew: &Crew) -> (Vec<usize>, Vec<LostJob>) {
         let mut seen = Vec::new();
         let stages = Stages {
+            at_once: 4,
             footprint_bytes: |_| 40,
             work: |job: usize, _: &mut Reservation| {
                 assert!(job != 13, "unlucky");
@@ -238,7 +247,8 @@ mod tests {
 
     #[test]
     fn what_cannot_be_collected_stops_the_run() {
-        let stages = Stages { footprint_bytes: |_| 1, work: |job, _: &mut Reservation| Ok::<_, Infallible>(job) };
+        let stages =
+            Stages { at_once: 3, footprint_bytes: |_| 1, work: |job, _: &mut Reservation| Ok::<_, Infallible>(job) };
         let jobs: Vec<usize> = (0..10_000).collect();
         let collect = |job, _| if job == 5 { Err("full") } else { Ok(()) };
         assert_eq!(over_jobs(&crew(3, 100), &jobs, &stages, collect), Err(Stopped::Collecting("full")));
@@ -253,6 +263,7 @@ mod tests {
     fn a_cancelled_run_ends_interrupted() {
         let crew = crew(2, 100);
         let stages = Stages {
+            at_once: 1,
             footprint_bytes: |_| 1,
             work: |job, _: &mut Reservation| {
                 if job == 3 {
