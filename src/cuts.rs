@@ -43,7 +43,7 @@ pub fn curvature_core(index: &Index, settings: &Settings, threads: usize, memory
 pub struct GrainCores {
     /// The largest that memory allows.
     pub largest: CoreSize,
-    /// Whether they may be smaller, if grains are narrow enough, so that every thread has tiles.
+    /// Whether they may be smaller, if grains are narrow enough, so that all threads are busy.
     pub divisible: bool,
 }
 

@@ -50,6 +50,11 @@ pub enum Error {
         /// The tile and what it said.
         lost: LostJob,
     },
+    /// The published stencil is as wide as vertices lie from their triangles, which here is nothing.
+    #[error(
+        "every vertex has a face that names it three times, so that the nearest centre of a triangle is 0 m away and curvature has no scale\nhelp: remove the faces without area, for instance in MeshLab with Filters > Cleaning and Repairing"
+    )]
+    NoSpacing,
     /// An interrupted run cannot be resumed.
     #[error(transparent)]
     Resume(#[from] ResumeError),

@@ -3,7 +3,7 @@
 use crate::cuts::LARGEST_CORE;
 use crate::index::{BuildRoom, disk_bytes};
 use crate::open::Reach;
-use crate::passes::{Survey, tiles_at_once};
+use crate::passes::Survey;
 use crate::settings::Settings;
 use crate::tile::TileMesh;
 
@@ -111,5 +111,6 @@ pub fn tiles_bytes(
         let (what, otherwise) = ("the run, with its largest tile,", "a smaller --tile-size");
         return Err(ForecastError::Memory { what, needed: largest + fixed, memory: memory + fixed, otherwise });
     }
-    Ok((largest * tiles_at_once(threads).min(survey.plan.tiles.len()) as u64).min(memory))
+    // As many as there are threads where they are small.
+    Ok((largest * threads.min(survey.plan.tiles.len()) as u64).min(memory))
 }

@@ -5,7 +5,7 @@ use gravelometer::cli::{Cli, Command, DemoArgs, InspectArgs, Log, RunArgs, Setti
 use gravelometer::cli::{cost_table, report_error, reporter};
 use gravelometer::demo::{Demonstration, demonstrate};
 use gravelometer::error::{Error, ExitCode};
-use gravelometer::pipeline::{Cancelled, Control, Interrupted};
+use gravelometer::pipeline::{Cancelled, Control, Interrupted, share_one_heap};
 use gravelometer::progress::Progress;
 use gravelometer::run::{Job, is_done, run};
 use gravelometer::settings::InputSettings;
@@ -13,6 +13,7 @@ use std::io::Write;
 use std::time::Duration;
 
 fn main() -> std::process::ExitCode {
+    share_one_heap();
     let (log, result) = match Cli::parse().command {
         Command::Run(args) => (args.log, run_command(&args)),
         Command::Inspect(args) => (Log::Text, inspect_command(&args)),

@@ -108,9 +108,9 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let room = forecast::room(&reach, memory)?;
     let budget = (room.bytes, forecast::fixed_bytes(&reach));
     let crew = Crew { pool, budget: Budget::strict(room.bytes), control: control.clone() };
-    let kept = work.index(&reach)?;
-    let made = kept.is_none();
-    let mut index = match kept {
+    let earlier = work.index(&reach)?;
+    let made = earlier.is_none();
+    let mut index = match earlier {
         Some(index) => index,
         None => {
             let disk = forecast::disk(&reach, room, &work.path().display().to_string(), work.free_bytes())?;
@@ -118,11 +118,11 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
             make_index(&reach, &work, room, &crew, progress)?
         }
     };
-    control.check()?;
 
-    // plan, and tile by tile: spacing; the disk takes the index meanwhile
+    // plan, and tile by tile: spacing; the disk takes the index meanwhile, also that of a run that is to stop
     let keep = || if made { work.keep_index(&reach, &index) } else { Ok(()) };
     let (kept, planned) = beside(keep, || {
+        control.check()?;
         check_outputs(&reach, &index, settings)?;
         let mut curvature = work.curvature(&reach, &index, settings)?;
         let plans = plans(&index, &mut curvature, settings, (threads, budget), progress)?;
@@ -130,7 +130,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
         let spacing_m = curvature.spacing_m(|| spacing_m(&survey, &crew, progress))?;
         Ok::<_, Error>((curvature, plans, spacing_m))
     });
-    kept?;
+    kept.inspect_err(|_| work.give_up_index())?;
     let (mut curvature, plans, spacing_m) = planned?;
     index.scale.spacing_m = spacing_m;
 
@@ -289,7 +289,8 @@ fn plans(
 
 fn spacing_m(survey: &Survey, crew: &Crew, progress: &dyn Progress) -> Result<f64, Error> {
     let (spacing_m, lost) = survey.spacing(crew, progress)?;
-    none_lost("spacing", lost).map(|()| spacing_m)
+    none_lost("spacing", lost)?;
+    if spacing_m > 0.0 { Ok(spacing_m) } else { Err(Error::NoSpacing) }
 }
 
 fn open(job: &Job, progress: &dyn Progress) -> Result<(Reach, Vec<crate::open::Warning>), Error> {

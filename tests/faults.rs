@@ -113,6 +113,16 @@ fn a_mesh_of_faces_without_area_is_refused() {
 }
 
 #[test]
+fn a_mesh_whose_vertices_all_have_a_face_of_their_own_is_refused() {
+    let mut surface = small();
+    surface.triangles.extend((0..surface.positions.len() as u64).map(|v| [v; 3]));
+    let run = Run::of(&ply(&surface));
+    assert_eq!(run.output.status.code(), Some(1), "{}", run.stderr());
+    let text = run.stderr();
+    assert!(text.contains("three times") && text.contains("\nhelp: "), "{text}");
+}
+
+#[test]
 fn an_ascii_file_is_refused_with_a_way_out() {
     let text = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
                 element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";

@@ -2,7 +2,7 @@
 
 /// A value, or none where something beyond what was loaded could change it. Half the size of an `Option`: there is one
 /// for every vertex of a tile.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Certain(f64);
 
 impl Certain {

@@ -127,6 +127,7 @@ impl Index {
         let ground = ground::look(surface)?;
         let fits = |n: u64| n <= u64::from(u32::MAX);
         let wide = room.wide || !fits(surface.vertices()) || !fits(surface.triangles());
+        let room = BuildRoom { wide, ..room };
         let shards = shards::cut(&ground.in_row, shard_vertices(ground.vertices, room));
         let columns = Columns {
             positions: shelf.create(POSITIONS, ground.vertices)?,

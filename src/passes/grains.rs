@@ -27,10 +27,12 @@ pub struct Recipe<'a> {
     pub usual_width_m: Option<f64>,
 }
 
-/// Threads that a tile of the grain pass keeps busy by itself. Two were measured: 1.9 times one.
+/// Threads that a large tile of the grain pass keeps busy by itself. Two were measured: 1.9 times one.
 const THREADS_OF_A_TILE: usize = 4;
+/// Triangles of a core below which a tile has too little work to share out.
+const SMALL_TILE: u64 = 1_000_000;
 
-/// Tiles of the grain pass that keep so many threads busy. Fewer tiles are larger ones, which repeat less in their
+/// Large tiles of the grain pass that keep so many threads busy. Fewer tiles are larger ones, which repeat less in their
 /// halos.
 pub fn tiles_at_once(threads: usize) -> usize {
     threads.div_ceil(THREADS_OF_A_TILE)
@@ -76,8 +78,10 @@ impl Survey<'_> {
         progress: &dyn Progress,
         mut collect: impl FnMut(usize, TileFinding) -> Result<(), C>,
     ) -> Result<Vec<LostJob>, Stopped<C>> {
+        let threads = crew.pool.current_num_threads();
+        let small = jobs.iter().all(|&job| self.triangles_in(self.core(job)) < SMALL_TILE);
         let stages = Stages {
-            at_once: tiles_at_once(crew.pool.current_num_threads()),
+            at_once: if small { threads } else { tiles_at_once(threads) },
             footprint_bytes: |job| TileMesh::footprint_bytes(self.triangles_in(&self.first_block(job, recipe))),
             work: |job, reservation: &mut Reservation| self.tile(job, recipe, reservation),
         };

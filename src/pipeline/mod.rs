@@ -7,15 +7,17 @@
 //!  and a job's bytes     free both
 //! ```
 //!
-//! A worker without a job helps inside those of others, so that one job at a time keeps all threads busy where
-//! memory holds no more.
+//! A worker without a job helps inside those of others, so that few jobs at once, where memory holds no more, keep all
+//! threads busy.
 //!
 //! One thread or many, the caller sees the same results in the same order.
 
+mod arena;
 mod budget;
 mod control;
 mod machine;
 
+pub use arena::share_one_heap;
 pub use budget::{Budget, OverBudget, Reservation};
 pub use control::{Cancelled, Control, Interrupted};
 pub use machine::{cpu_seconds, memory_there_bytes, peak_memory_bytes};
@@ -61,9 +63,9 @@ pub struct LostJob {
     pub message: String,
 }
 
-/// The two closures of a pipeline.
+/// What a pipeline does with a job, and with how many.
 pub struct Stages<F, W> {
-    /// Jobs in flight, at most.
+    /// Jobs in flight, at most; at least 1.
     pub at_once: usize,
     /// Bytes that a job takes while it is in flight.
     pub footprint_bytes: F,
@@ -97,7 +99,8 @@ pub fn over_jobs<R: Send, E: Display, C>(
     mut collect: impl FnMut(usize, R) -> Result<(), C>,
 ) -> Result<Vec<LostJob>, Stopped<C>> {
     let workers = crew.pool.current_num_threads();
-    let (slot_taken, slot_free) = bounded::<()>(stages.at_once);
+    let (here_in, here_out) = bounded::<()>(workers);
+    let (slot_taken, slot_free) = bounded::<()>(stages.at_once.max(1));
     let (given_in, given_out) = bounded::<(usize, Reservation)>(0);
     let (done_in, done_out) = bounded::<(usize, Result<R, LostJob>)>(workers);
     let mut lost = Vec::new();
@@ -108,6 +111,9 @@ pub fn over_jobs<R: Send, E: Display, C>(
     std::thread::scope(|scope| {
         scope.spawn(|| {
             let given_in = given_in;
+            // A worker that came later could begin on top of a piece of a job that it helps with, and that job would
+            // wait for it for ever.
+            (0..workers).for_each(|_| here_out.recv().unwrap_or_default());
             for &job in jobs {
                 // Both ends of the slots outlive this: they can always be taken and given back.
                 let _ = slot_taken.send(());
@@ -121,7 +127,10 @@ pub fn over_jobs<R: Send, E: Display, C>(
         let from = given_out;
         scope.spawn(|| {
             let (from, done_in) = (from, done_in);
-            crew.pool.broadcast(|_| work_all(&from, &done_in, &slot_free, &go_on, stages));
+            crew.pool.broadcast(|_| {
+                let _ = here_in.send(());
+                work_all(&from, &done_in, &slot_free, &go_on, stages);
+            });
         });
         // Results arrive in any order; those that are early wait here.
         let mut early = BTreeMap::new();
@@ -172,20 +181,22 @@ fn work_all<R, E: Display>(
     }
 }
 
-/// How long a worker waits for a job before it looks again whether it can help.
-const PAUSE: Duration = Duration::from_micros(500);
+/// How long a worker waits for a job before it looks again whether it can help: at first, and at most, after it has
+/// found nothing to help with several times.
+const PAUSES: [Duration; 2] = [Duration::from_micros(100), Duration::from_millis(4)];
 
 /// The next job; none when there will be no more. Until there is one, helps the other threads of the pool.
 fn next_job<J>(from: &Receiver<J>) -> Option<J> {
+    let mut pause = PAUSES[0];
     loop {
         match from.try_recv() {
             Ok(job) => return Some(job),
             Err(TryRecvError::Disconnected) => return None,
-            Err(TryRecvError::Empty) if rayon::yield_now() == Some(rayon::Yield::Executed) => {}
-            Err(TryRecvError::Empty) => match from.recv_timeout(PAUSE) {
+            Err(TryRecvError::Empty) if rayon::yield_now() == Some(rayon::Yield::Executed) => pause = PAUSES[0],
+            Err(TryRecvError::Empty) => match from.recv_timeout(pause) {
                 Ok(job) => return Some(job),
                 Err(RecvTimeoutError::Disconnected) => return None,
-                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Timeout) => pause = (2 * pause).min(PAUSES[1]),
             },
         }
     }
@@ -210,6 +221,7 @@ fn guarded<T, E: Display>(job: usize, work: impl FnOnce() -> Result<T, E>) -> Re
 mod tests {
     use super::*;
     use std::convert::Infallible;
+    use std::sync::atomic::AtomicUsize;
 
     fn crew(threads: usize, bytes: u64) -> Crew {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
@@ -243,6 +255,62 @@ mod tests {
             let why = |job, message: &str| LostJob { job, message: message.into() };
             assert_eq!(lost, [why(13, "unlucky"), why(17, "not today")]);
         }
+    }
+
+    #[test]
+    fn no_more_jobs_are_in_flight_than_are_allowed() {
+        for at_once in [1, 2] {
+            let (now, most) = (AtomicUsize::new(0), AtomicUsize::new(0));
+            let stages = Stages {
+                at_once,
+                footprint_bytes: |_| 1,
+                work: |_, _: &mut Reservation| {
+                    most.fetch_max(now.fetch_add(1, Ordering::SeqCst) + 1, Ordering::SeqCst);
+                    std::thread::sleep(Duration::from_millis(2));
+                    now.fetch_sub(1, Ordering::SeqCst);
+                    Ok::<_, Infallible>(())
+                },
+            };
+            let jobs: Vec<usize> = (0..30).collect();
+            let lost = over_jobs(&crew(4, 100), &jobs, &stages, |_, ()| Ok::<_, Infallible>(()));
+            assert_eq!((lost, most.load(Ordering::SeqCst)), (Ok(Vec::new()), at_once));
+        }
+    }
+
+    #[test]
+    fn threads_without_a_job_help_inside_the_only_one() {
+        use rayon::prelude::*;
+        let stages = Stages {
+            at_once: 1,
+            footprint_bytes: |_| 1,
+            work: |_, _: &mut Reservation| {
+                let wait = |_| {
+                    std::thread::sleep(Duration::from_millis(5));
+                    rayon::current_thread_index()
+                };
+                let mut threads: Vec<_> = (0..40).into_par_iter().with_max_len(1).map(wait).collect();
+                threads.sort_unstable();
+                threads.dedup();
+                Ok::<_, Infallible>(threads.len())
+            },
+        };
+        let mut helped = Vec::new();
+        let collect = |_, threads| {
+            helped.push(threads);
+            Ok::<_, Infallible>(())
+        };
+        // While the first is worked, the second waits: the other threads have nothing else to do.
+        assert_eq!(over_jobs(&crew(3, 100), &[0, 1], &stages, collect), Ok(Vec::new()));
+        assert!(helped.iter().all(|&threads| threads > 1), "{helped:?}");
+    }
+
+    #[test]
+    fn what_waits_for_the_disk_is_done_beside_work() {
+        let (a_in, a_out) = bounded(1);
+        let (b_in, b_out) = bounded(1);
+        let aside = || a_in.send(1).is_ok() && b_out.recv() == Ok(2);
+        let work = || b_in.send(2).is_ok() && a_out.recv() == Ok(1);
+        assert_eq!(beside(aside, work), (true, true));
     }
 
     #[test]

@@ -200,13 +200,19 @@ impl WorkFolder {
         Ok(build(&shelf)?)
     }
 
-    /// Waits until the disk has the index, from where on a later run finds it. What cannot be kept is removed.
+    /// Waits until the disk has the index, from where on a later run finds it.
     ///
     /// # Errors
     /// The disk says no.
     pub fn keep_index(&self, reach: &Reach, index: &Index) -> Result<(), StoreError> {
         let keep = |shelf: &Shelf| index.keep(shelf, &Identity::of_survey(reach).text());
-        self.shelf.inner(INDEX).and_then(|shelf| keep(&shelf)).inspect_err(|_| self.remove(INDEX))
+        self.shelf.inner(INDEX).and_then(|shelf| keep(&shelf))
+    }
+
+    /// Makes room on a disk that could not keep an index: nothing that depends on it is worth keeping either.
+    pub fn give_up_index(&self) {
+        self.remove(CURVATURE);
+        self.remove(INDEX);
     }
 
     /// Spacing and divergence, as far as they are there.

@@ -26,7 +26,7 @@ impl Adjacency {
         let alone = |t| [t; 3].map(AtomicU32::new);
         let sides: Vec<Sides> = (0..mesh.triangles.len() as u32).into_par_iter().map(alone).collect();
         let ends: Vec<_> =
-            (0..edges::count(mesh)).into_par_iter().map(|band| edges::join(bands, band, &sides)).collect();
+            (0..edges::band_count(mesh)).into_par_iter().map(|band| edges::join(bands, band, &sides)).collect();
         let mut adjacency = Adjacency {
             sides,
             fork_starts: vec![0],

@@ -35,7 +35,7 @@ impl Half {
 }
 
 /// How many bands the vertices of a tile are joined in.
-pub(super) fn count(mesh: &TileMesh) -> usize {
+pub(super) fn band_count(mesh: &TileMesh) -> usize {
     mesh.positions.len().div_ceil(BAND)
 }
 

@@ -44,13 +44,13 @@ pub fn dilate(bands: &Bands, labels: &mut Labels) {
     let mut carried = carried(bands, labels);
     let front = front(bands, labels, &carried);
     for proposal in &front {
-        for v in bands.mesh.triangles[proposal.triangle as usize] {
+        for v in bands.mesh.triangles[(proposal.triangle & !MAY_JOIN) as usize] {
             let label = &mut carried[v as usize];
             let (free, unsure) = (*label & !UNSURE == NONE, (*label | proposal.body) & UNSURE);
             *label = unsure | !UNSURE & if free { proposal.body } else { *label };
         }
     }
-    for t in front.iter().filter(|p| p.may_join).map(|p| p.triangle as usize) {
+    for t in front.iter().filter(|p| p.triangle & MAY_JOIN != 0).map(|p| (p.triangle & !MAY_JOIN) as usize) {
         let now = bands.mesh.triangles[t].map(|v| carried[v as usize]);
         // What proposals for its vertices hang on includes its vertices themselves.
         if (now[0] | now[1] | now[2]) & UNSURE != 0 {
@@ -79,12 +79,14 @@ fn carried(bands: &Bands, labels: &Labels) -> Vec<u32> {
 
 /// A triangle whose vertices do not agree, or not for certain.
 struct Proposal {
+    /// Its number, which is below 2^30; [`MAY_JOIN`] if it may join a body itself: it is removed, and not between two.
     triangle: u32,
     /// The body that it proposes for its vertices, [`NONE`] if that is none or not one; [`UNSURE`] if one of them is.
     body: u32,
-    /// Whether it may join a body itself: it is removed, and not between two.
-    may_join: bool,
 }
+
+/// Set in the number of a triangle that may join a body.
+const MAY_JOIN: u32 = 1 << 31;
 
 /// All proposals, ascending.
 fn front(bands: &Bands, labels: &Labels, carried: &[u32]) -> Vec<Proposal> {
@@ -95,7 +97,8 @@ fn front(bands: &Bands, labels: &Labels, carried: &[u32]) -> Vec<Proposal> {
             return None;
         }
         let may_join = labels.state[t] == State::Removed && !between_two_bodies(was);
-        Some(Proposal { triangle: t as u32, body: only_body(was.map(|l| l & !UNSURE)) | unsure, may_join })
+        let triangle = t as u32 | if may_join { MAY_JOIN } else { 0 };
+        Some(Proposal { triangle, body: only_body(was.map(|l| l & !UNSURE)) | unsure })
     };
     bands.mesh.triangles.par_iter().enumerate().filter_map(proposal).collect()
 }

@@ -46,7 +46,7 @@ impl NormalField {
     }
 
     /// Bytes that a field of this many triangles takes while it is worked on: 48 for itself, 16 for the points of
-    /// its core, 30 for grids and results, 8 for the exact search where it is needed.
+    /// its core, 26 for grids and results, 8 for the exact search where it is needed.
     pub fn footprint_bytes(triangles: u64) -> u64 {
         triangles * 102
     }
