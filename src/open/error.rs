@@ -44,12 +44,18 @@ pub enum OpenError {
         "{path}: header line {line} cannot be understood: `{text}` ({reason})\nhelp: export the mesh again as PLY 1.0"
     )]
     HeaderLine { path: String, line: u64, text: String, reason: String },
-    /// An encoding that is not read.
+    /// Text where a number should be.
     #[error(
-        "{path}: is {encoding} PLY; this version reads binary_little_endian only\nhelp: open it in CloudCompare or \
-         MeshLab and save it as binary PLY"
+        "{path}: line {line}: `{text}` is no number that `{property}` of {element} {index} can be\nhelp: the data do not \
+         match the header; export the file again"
     )]
-    Encoding { path: String, encoding: String },
+    NoNumber { path: String, line: u64, element: String, index: u64, property: String, text: String },
+    /// No room for what an encoding is turned into.
+    #[error(
+        "{path}: is not plain binary PLY, so it is written as such first, and that fails in {folder}: {source}\nhelp: \
+         free some space there, or set TMPDIR to a folder with room for about the file's size"
+    )]
+    Scratch { path: String, folder: String, source: std::io::Error },
     /// An element is declared twice.
     #[error(
         "{path}: the header declares element `{element}` twice\nhelp: export the mesh again with one `{element}` element"
@@ -69,12 +75,6 @@ pub enum OpenError {
          help: mesh it first, for instance with Poisson reconstruction in CloudCompare or MeshLab"
     )]
     PointCloud { path: String, vertices: u64 },
-    /// The file holds triangle strips.
-    #[error(
-        "{path}: holds triangle strips (element `tristrips`), which are not read\nhelp: open it in MeshLab and save it \
-         again, which writes single faces"
-    )]
-    TriangleStrips { path: String },
     /// A property is missing.
     #[error(
         "{path}: element `{element}` has no property `{property}` (it has: {found})\nhelp: export the mesh again with \
@@ -87,12 +87,6 @@ pub enum OpenError {
          mesh again, for instance from CloudCompare or MeshLab"
     )]
     PropertyKind { path: String, element: String, property: String, kind: String, expected: &'static str },
-    /// A needed vertex property lies behind a list.
-    #[error(
-        "{path}: vertex property `{property}` follows the list `{list}`, so that its place differs from vertex to \
-         vertex\nhelp: open the file in MeshLab and save it without `{list}`"
-    )]
-    PropertyAfterList { path: String, property: String, list: String },
 
     /// The file ends too early.
     #[error(

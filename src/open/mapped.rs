@@ -64,6 +64,16 @@ impl MappedFile {
         Ok(MappedFile { map, modified_s, passed: AtomicU64::new(0) })
     }
 
+    /// Maps a scratch file without a name, which stands for a file that was changed at this time.
+    ///
+    /// # Errors
+    /// The system refuses.
+    pub(super) fn of_scratch(file: &File, modified_s: i64) -> std::io::Result<MappedFile> {
+        // SAFETY: as in `open`; a file without a name is nobody else's.
+        let map = unsafe { Mmap::map(file) }?;
+        Ok(MappedFile { map, modified_s, passed: AtomicU64::new(0) })
+    }
+
     /// Says that so many bytes were read and are not needed soon.
     pub(super) fn passed(&self, bytes: u64) {
         if self.passed.fetch_add(bytes, Ordering::Relaxed) + bytes >= KEPT_BYTES {

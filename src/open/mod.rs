@@ -6,6 +6,7 @@ mod faces;
 mod frame;
 mod gdal_messages;
 mod mapped;
+mod numbers;
 mod ply;
 mod ply_header;
 mod precision;
@@ -15,6 +16,7 @@ mod records;
 mod scalar;
 mod surface;
 mod survey_file;
+mod transcode;
 mod vertices;
 mod warning;
 

@@ -6,13 +6,20 @@ use super::mapped::MappedFile;
 use super::ply_header::PlyHeader;
 use super::progress::Progress;
 use super::records::{Source, locate};
+use super::survey_file::Fingerprint;
+use super::transcode::{Transcoded, is_needed, transcode};
 use super::vertices::Vertices;
 use ply_rs_bw::ply::Encoding;
 
 /// A validated PLY mesh: no later read of a vertex or triangle below the counts can fail.
 #[derive(Debug)]
 pub(super) struct PlyMesh {
+    /// The records: of the file itself, or of what it was transcoded to.
     bytes: MappedFile,
+    /// Of the file itself.
+    pub(super) fingerprint: Fingerprint,
+    /// Of the file itself.
+    pub(super) encoding: Encoding,
     pub(super) header: PlyHeader,
     pub(super) vertices: Vertices,
     pub(super) faces: Faces,
@@ -30,15 +37,22 @@ impl PlyMesh {
     pub(super) fn open(path: &str, bytes: MappedFile, progress: &Progress<'_>) -> Result<PlyMesh, OpenError> {
         let header = PlyHeader::parse(path, &bytes)?;
         check_is_mesh(path, &header)?;
-        match header.encoding {
-            Encoding::BinaryLittleEndian => PlyMesh::little_endian(path, bytes, header, progress),
-            other => Err(OpenError::Encoding { path: path.to_owned(), encoding: other.to_string() }),
+        let fingerprint = Fingerprint::of(&bytes, bytes.modified_s());
+        if !is_needed(&header) {
+            return PlyMesh::records(path, (bytes, fingerprint), header, progress);
         }
+        let encoding = header.encoding;
+        let source = Source { path, bytes: &bytes };
+        let Transcoded { bytes, header, trailing_bytes } = transcode(source, &header, progress)?;
+        check_is_mesh(path, &header)?;
+        let mesh = PlyMesh::records(path, (bytes, fingerprint), header, progress)?;
+        Ok(PlyMesh { encoding, trailing_bytes, ..mesh })
     }
 
-    fn little_endian(
+    /// Finds and validates records of little-endian numbers.
+    fn records(
         path: &str,
-        bytes: MappedFile,
+        (bytes, fingerprint): (MappedFile, Fingerprint),
         header: PlyHeader,
         progress: &Progress<'_>,
     ) -> Result<PlyMesh, OpenError> {
@@ -65,7 +79,8 @@ impl PlyMesh {
         };
         let bounds = vertices.validate(source, progress)?;
         let trailing_bytes = bytes.len() as u64 - at;
-        Ok(PlyMesh { bytes, header, vertices, faces, bounds, trailing_bytes })
+        let encoding = header.encoding;
+        Ok(PlyMesh { bytes, fingerprint, encoding, header, vertices, faces, bounds, trailing_bytes })
     }
 
     /// The file's bytes.
@@ -82,11 +97,6 @@ impl PlyMesh {
     /// Lets go of the file's pages, if they are more than may be kept.
     pub(super) fn release_if_large(&self) {
         self.bytes.release_if_large();
-    }
-
-    /// Time of the file's last change, seconds since 1970.
-    pub(super) fn modified_s(&self) -> i64 {
-        self.bytes.modified_s()
     }
 }
 
@@ -105,8 +115,8 @@ fn check_is_mesh(path: &str, header: &PlyHeader) -> Result<(), OpenError> {
     if header.element("face").is_some_and(|face| face.count > 0) {
         return Ok(());
     }
-    if header.element("tristrips").is_some() {
-        return Err(OpenError::TriangleStrips { path: path() });
+    if header.element("tristrips").is_some_and(|strips| strips.count > 0) {
+        return Ok(());
     }
     Err(OpenError::PointCloud { path: path(), vertices: vertex.count })
 }

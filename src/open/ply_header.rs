@@ -25,6 +25,8 @@ pub(super) struct PlyHeader {
     pub(super) comments: Vec<String>,
     /// First byte of the payload.
     pub(super) payload: u64,
+    /// Lines before it.
+    pub(super) lines: u64,
 }
 
 /// One element: `count` records of the same properties.
@@ -98,8 +100,13 @@ impl PlyHeader {
                     .collect(),
             })
             .collect();
-        let header =
-            PlyHeader { encoding: parsed.encoding, elements, comments: plain.comments, payload: lines.payload };
+        let header = PlyHeader {
+            encoding: parsed.encoding,
+            elements,
+            comments: plain.comments,
+            payload: lines.payload,
+            lines: lines.texts.len() as u64,
+        };
         header.check(path)?;
         Ok(header)
     }

@@ -22,7 +22,7 @@ pub struct Fingerprint {
 const END_BYTES: usize = 64 << 10;
 
 impl Fingerprint {
-    fn of(bytes: &[u8], modified_s: i64) -> Fingerprint {
+    pub(super) fn of(bytes: &[u8], modified_s: i64) -> Fingerprint {
         let end = bytes.len().min(END_BYTES);
         let hash = fnv1a64(fnv1a64(FNV_BASIS, &bytes[..end]), &bytes[bytes.len() - end..]);
         Fingerprint { bytes: bytes.len() as u64, modified_s, ends_fnv1a64: hash }
@@ -49,14 +49,13 @@ pub struct SurveyFile {
 
 impl SurveyFile {
     pub(super) fn new(path: &Path, mesh: PlyMesh, before: Option<&SurveyFile>) -> SurveyFile {
-        let fingerprint = Fingerprint::of(mesh.bytes(), mesh.modified_s());
         SurveyFile {
             path: path.to_owned(),
+            fingerprint: mesh.fingerprint,
             mesh,
             first_vertex: before.map_or(0, |f| f.first_vertex + f.vertices()),
             first_face: before.map_or(0, |f| f.first_face + f.faces()),
             first_triangle: before.map_or(0, |f| f.first_triangle + f.triangles()),
-            fingerprint,
         }
     }
 
@@ -107,7 +106,7 @@ impl SurveyFile {
 
     /// Format and encoding, such as `PLY binary_little_endian`.
     pub fn format(&self) -> String {
-        format!("PLY {}", self.mesh.header.encoding)
+        format!("PLY {}", self.mesh.encoding)
     }
 
     /// Types of x, y and z.

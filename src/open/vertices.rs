@@ -255,7 +255,7 @@ impl Vertices {
     }
 }
 
-/// The numbers before the first list, and their length in bytes.
+/// The numbers before the first list, and their length in bytes. Behind it there are none: see [`super::transcode`].
 fn leading_scalars(element: &Element) -> (Vec<ScalarProperty>, usize) {
     let (mut scalars, mut offset) = (Vec::new(), 0);
     for property in &element.properties {
@@ -280,18 +280,13 @@ fn find_axis(
         None => {
             Err(OpenError::PropertyMissing { path, element: "vertex", property: name, found: element.property_names() })
         }
-        Some(property) if matches!(property.kind, Kind::List { .. }) => Err(OpenError::PropertyKind {
+        Some(property) => Err(OpenError::PropertyKind {
             path,
             element: "vertex".into(),
             property: name.into(),
             kind: property.kind.to_string(),
             expected: "a number",
         }),
-        Some(_) => {
-            let list = element.properties.iter().find(|p| matches!(p.kind, Kind::List { .. }));
-            let list = list.map(|p| p.name.clone()).unwrap_or_default();
-            Err(OpenError::PropertyAfterList { path, property: name.into(), list })
-        }
     }
 }
 

@@ -1,6 +1,8 @@
 //! The same surface under many layouts.
 
-use crate::ply_bytes::{Element, PLACES, TRIANGLES, axis, corner_lists, faces, file, file_with, header, vertices};
+use crate::ply_bytes::{
+    Element, PLACES, TRIANGLES, axis, corner_lists, faces, file, file_in, file_with, header, vertices,
+};
 use crate::{assert_contains, open_bytes};
 use gravelometer::open::{OpenError, Reach, Scalar, Warning};
 use gravelometer::settings::InputSettings;
@@ -128,8 +130,57 @@ fn vertex_lists_behind_the_coordinates_are_stepped_over() {
         .numbers("double x", axis(0))
         .numbers("double y", axis(1))
         .numbers("double z", axis(2));
-    let error = open_bytes(&file(&[&behind, &faces()])).expect_err("x has no fixed place");
-    assert_contains(&error.to_string(), &["`x`", "`view_indices`"]);
+    let behind = behind.numbers("ushort view", axis(0));
+    let reach = opened(&file(&[&behind, &faces()]));
+    assert_is_the_patch(&reach);
+    let names: Vec<_> = reach.files()[0].vertex_properties().iter().map(|p| p.name.as_str()).collect();
+    assert_eq!(names, ["x", "y", "z", "view"]);
+}
+
+#[test]
+fn every_encoding_holds_the_same_patch() {
+    let edge =
+        Element::new("edge").lists("list uchar int ends", [vec![1.0], vec![1.0, 2.0]]).numbers("short n", [7.0; 2]);
+    let colored =
+        vertices().numbers("uchar red", [9.0; 5]).numbers("uchar green", [8.0; 5]).numbers("uchar blue", [7.0; 5]);
+    let same = |elements: &[&Element]| {
+        let plain = opened(&file(elements));
+        assert_is_the_patch(&plain);
+        for encoding in ["ascii", "binary_big_endian"] {
+            let reach = opened(&file_in(encoding, elements));
+            assert_is_the_patch(&reach);
+            assert_eq!(reach.files()[0].format(), format!("PLY {encoding}"));
+            for v in 0..5 {
+                assert_eq!(reach.files()[0].vertex_record(v), plain.files()[0].vertex_record(v), "{encoding}");
+                assert_eq!(reach.color(v), plain.color(v), "{encoding}");
+            }
+        }
+    };
+    same(&[&vertices(), &faces()]);
+    same(&[&edge, &faces(), &colored, &edge_again()]);
+}
+
+fn edge_again() -> Element {
+    Element::new("light").numbers("double x", [0.5])
+}
+
+/// The patch as strips: round the middle and back again, with a triangle that only leads on, then a strip of one.
+#[test]
+fn strips_of_triangles_are_cut_with_their_winding() {
+    let strip = vec![4.0, 0.0, 1.0, 1.0, 4.0, 2.0, -1.0, 4.0, 2.0, 3.0, -1.0, -1.0, 3.0, 0.0, 4.0];
+    let strips = Element::new("tristrips").lists("list int int vertex_indices", [strip]);
+    for bytes in [file(&[&vertices(), &strips]), file_in("ascii", &[&vertices(), &strips])] {
+        let reach = opened(&bytes);
+        let turned = |t: [u64; 3]| {
+            let lowest = (0..3).min_by_key(|&i| t[i]).unwrap_or(0);
+            [t[lowest], t[(lowest + 1) % 3], t[(lowest + 2) % 3]]
+        };
+        let mut found: Vec<_> = (0..reach.triangles()).map(|t| turned(reach.triangle(t))).collect();
+        let mut expected = TRIANGLES.map(turned);
+        found.sort_unstable();
+        expected.sort_unstable();
+        assert_eq!(found, expected);
+    }
 }
 
 #[test]

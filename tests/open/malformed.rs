@@ -1,6 +1,6 @@
 //! Each malformed file gives its precise error.
 
-use crate::ply_bytes::{Element, axis, corner_lists, faces, file, header, vertices};
+use crate::ply_bytes::{Element, axis, corner_lists, faces, file, file_in, header, vertices};
 use crate::{assert_contains, open_bytes, refusal};
 use gravelometer::open::{OpenError, Reach};
 use gravelometer::settings::InputSettings;
@@ -199,15 +199,30 @@ fn a_list_length_beyond_the_file_is_a_truncation() {
 }
 
 #[test]
-fn other_encodings_are_refused_with_the_remedy() {
-    let text = header(&[&vertices(), &faces()], "\n");
+fn other_encodings_that_are_cut_off_name_the_record() {
     for encoding in ["ascii", "binary_big_endian"] {
-        let message = refusal(text.replace("binary_little_endian", encoding).as_bytes());
-        assert_contains(
-            &message,
-            &[&format!("is {encoding} PLY"), "binary_little_endian only", "save it as binary PLY"],
-        );
+        let whole = file_in(encoding, &[&vertices(), &faces()]);
+        let header = whole.windows(11).position(|w| w == b"end_header\n").expect("a header") + 11;
+        for cut in header..whole.len() - 2 {
+            let message = refusal(&whole[..cut]);
+            // Text that is cut within a number may be another number.
+            let wrong = ["ends at byte", "is no number", "refers to vertex", "corners"];
+            assert!(wrong.iter().any(|w| message.contains(w)) || encoding == "ascii", "{message}");
+        }
+        assert_contains(&refusal(&whole[..header + 5]), &["ends at byte", "vertex 0 of 5"]);
     }
+}
+
+#[test]
+fn a_word_that_is_no_number_is_named_with_its_line() {
+    let text = String::from_utf8(file_in("ascii", &[&vertices(), &faces()])).expect("text");
+    let lines = text.lines().count() as u64;
+    let last = text.trim_end().rfind(' ').expect("a word") + 1;
+    let broken = format!("{}four\n", &text[..last]);
+    let expected = [&format!("line {lines}: `four`"), "`vertex_indices` of face 3"];
+    assert_contains(&refusal(broken.as_bytes()), &expected);
+    let beyond = format!("{}9\n", &text[..last]);
+    assert_contains(&refusal(beyond.as_bytes()), &["face 3 refers to vertex 9"]);
 }
 
 #[test]

@@ -50,7 +50,7 @@ impl Element {
         text
     }
 
-    fn payload(&self, out: &mut Vec<u8>) {
+    fn payload(&self, out: &mut Vec<u8>, push: impl Fn(&mut Vec<u8>, &str, f64)) {
         for record in 0..self.columns.first().map_or(0, |c| c.values.len()) {
             for column in &self.columns {
                 let words: Vec<&str> = column.declaration.split(' ').collect();
@@ -64,6 +64,19 @@ impl Element {
             }
         }
     }
+}
+
+/// The number with its highest byte first.
+fn push_turned(out: &mut Vec<u8>, kind: &str, value: f64) {
+    let start = out.len();
+    push(out, kind, value);
+    out[start..].reverse();
+}
+
+/// The number in words, one on a line.
+fn push_text(out: &mut Vec<u8>, kind: &str, value: f64) {
+    let text = if kind.starts_with("float") { (value as f32).to_string() } else { value.to_string() };
+    out.extend(format!(" {text}\r\n").into_bytes());
 }
 
 fn push(out: &mut Vec<u8>, kind: &str, value: f64) {
@@ -94,7 +107,19 @@ pub(crate) fn file(elements: &[&Element]) -> Vec<u8> {
 /// A whole file with these line ends.
 pub(crate) fn file_with(elements: &[&Element], newline: &str) -> Vec<u8> {
     let mut bytes = header(elements, newline).into_bytes();
-    elements.iter().for_each(|e| e.payload(&mut bytes));
+    elements.iter().for_each(|e| e.payload(&mut bytes, push));
+    bytes
+}
+
+/// A whole file in another encoding: `ascii` or `binary_big_endian`.
+pub(crate) fn file_in(encoding: &str, elements: &[&Element]) -> Vec<u8> {
+    let mut bytes = header(elements, "\n").replace("binary_little_endian", encoding).into_bytes();
+    for element in elements {
+        match encoding {
+            "ascii" => element.payload(&mut bytes, push_text),
+            _ => element.payload(&mut bytes, push_turned),
+        }
+    }
     bytes
 }
 
