@@ -24,6 +24,8 @@ const WIDTHS_AT_BORDER: f64 = 7.0;
 /// Work in halos, for each triangle of the survey, up to which it is cut into more tiles than memory asks for. The
 /// loops within a tile run on all threads as well, so that more would be gained for the clock alone.
 const WORTH_A_CUT: f64 = 0.2;
+/// Core, triangles, below which memory is rather given to one tile than to several at once.
+const LEAST_OF_SEVERAL: f64 = 1e6;
 /// Survey that is not cut for the sake of threads, triangles: to look how wide its grains are would cost too much.
 const LEAST_TO_CUT: u64 = 8_000_000;
 
@@ -85,7 +87,10 @@ impl Cuts {
             let divisible = at_once > 1 && triangles >= LEAST_TO_CUT && all * WITH_WIDE_HALO <= 1.0;
             return Cuts { least: 1.0, divisible };
         }
-        let by_memory = all / SHARE_OF_CUT * WITH_WIDE_HALO * at_once as f64;
+        let one_at_once = all / SHARE_OF_CUT * WITH_WIDE_HALO;
+        // More at once would be too small to be worked with their halos: others may wait.
+        let affordable = (triangles as f64 / one_at_once / LEAST_OF_SEVERAL) as usize;
+        let by_memory = one_at_once * at_once.min(affordable).max(1) as f64;
         Cuts { least: by_memory.max(triangles as f64 / LARGEST_CORE).max(2.0), divisible: false }
     }
 }
@@ -131,5 +136,7 @@ mod tests {
             let bytes = TileMesh::footprint_bytes((tile * WITH_WIDE_HALO) as u64) * at_once;
             assert!(bytes <= memory && !cuts(triangles, threads, memory).divisible, "{triangles}: {bytes} of {memory}");
         }
+        // Little memory is not shared out among tiles that are mostly halo.
+        assert_eq!(cuts(1_000_000, 16, 60 << 20), cuts(1_000_000, 1, 60 << 20));
     }
 }

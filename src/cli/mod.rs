@@ -71,7 +71,7 @@ pub enum Log {
 /// Arguments of `run`.
 #[derive(Debug, Args)]
 pub struct RunArgs {
-    /// Triangle meshes of one survey (binary little-endian PLY)
+    /// Triangle meshes of one survey (PLY with faces: binary or text)
     #[arg(required = true)]
     pub inputs: Vec<PathBuf>,
     /// Folder for the results; made if missing
@@ -178,7 +178,7 @@ impl SettingArgs {
 /// Arguments of `inspect`.
 #[derive(Debug, Args)]
 pub struct InspectArgs {
-    /// Triangle meshes of one survey (binary little-endian PLY)
+    /// Triangle meshes of one survey (PLY with faces: binary or text)
     #[arg(required = true)]
     pub inputs: Vec<PathBuf>,
     /// Print JSON
