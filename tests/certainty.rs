@@ -8,6 +8,7 @@
 mod support;
 
 use gravelometer::curvature::{InstructionSet, Stencil};
+use gravelometer::geometry::DVec3;
 use gravelometer::index::{BuildRoom, CellBlock, Index};
 use gravelometer::measure::Wanted;
 use gravelometer::open::MemorySurface;
@@ -305,4 +306,19 @@ fn the_order_of_the_file_does_not_change_a_bit_of_any_grain() {
             assert_same(&expected, &without_inputs(other), &format!("{dilation} rings, seed {seed}"));
         }
     }
+}
+
+#[test]
+fn a_survey_that_needs_no_cut_is_one_tile_however_little_of_its_box_it_fills() {
+    let mut surface = bed(5, 30, 30);
+    let first = surface.positions.len() as u64;
+    let far: Vec<DVec3> = surface.positions.iter().map(|&p| p + DVec3::new(9.0, 9.0, 0.0)).collect();
+    let again: Vec<[u64; 3]> = surface.triangles.iter().map(|t| t.map(|v| v + first)).collect();
+    surface.positions.extend(far);
+    surface.triangles.extend(again);
+    surface.colors.clear();
+    let index = support::indexed(&surface);
+    let all = surface.triangles.len() as f64;
+    assert_eq!(Plan::new(&index, CoreSize::holding(&index, all, 1)).tiles.len(), 1);
+    assert!(Plan::new(&index, CoreSize::holding(&index, all / 2.0, 1)).tiles.len() > 1);
 }

@@ -66,6 +66,10 @@ impl CoreSize {
     /// borders between them: what lies at a border is worked twice. If there are few, every one of `workers` gets
     /// as many.
     pub fn holding(index: &Index, triangles: f64, workers: usize) -> CoreSize {
+        if triangles >= index.scale.triangles as f64 {
+            // However little of its box a survey fills.
+            return CoreSize { columns: index.grid.columns.max(1), rows: index.grid.rows.max(1) };
+        }
         let (columns, rows) = (u64::from(index.grid.columns), u64::from(index.grid.rows));
         let per_cell = index.scale.triangles as f64 / index.triangles.occupied_cells().max(1) as f64;
         let least = (columns as f64 * rows as f64 * per_cell / triangles).ceil().max(1.0) as u64;
