@@ -11,6 +11,7 @@ use crate::tile::TileMesh;
 const BASE_BYTES: u64 = 64 << 20;
 /// Memory for tiles, or for sorting, without which a run makes no sense, bytes.
 const LEAST_BYTES: u64 = 16 << 20;
+
 /// A run that needs more than there is.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]

@@ -11,8 +11,8 @@ use super::scalar::Scalar;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Names under which the corners are written.
-const CORNER_NAMES: [&str; 2] = ["vertex_indices", "vertex_index"];
+/// Names under which the corners of a face, or of a strip of triangles, are written.
+pub(super) const CORNER_NAMES: [&str; 2] = ["vertex_indices", "vertex_index"];
 
 /// The faces of a PLY file. Polygons are fans of triangles about their first corner, in file order.
 #[derive(Debug)]

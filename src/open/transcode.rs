@@ -6,6 +6,7 @@
 //! the process whatever happens. Everything behind this sees one kind of file.
 
 use super::error::OpenError;
+use super::faces::CORNER_NAMES;
 use super::mapped::MappedFile;
 use super::numbers::{BigEndian, LittleEndian, Numbers, Text};
 use super::ply_header::{Element, Kind, PlyHeader, Property};
@@ -15,8 +16,6 @@ use super::scalar::Scalar;
 use ply_rs_bw::ply::Encoding;
 use std::io::{BufWriter, Write};
 
-/// Names under which the corners of a face or of a strip are written.
-const CORNER_NAMES: [&str; 2] = ["vertex_indices", "vertex_index"];
 const STRIPS: &str = "tristrips";
 
 /// Whether a file must be transcoded before its records can be found.
@@ -88,7 +87,7 @@ impl Job<'_> {
                 "face" if !strips => Some(self.corners(element, &mut numbers, &mut to, Self::face)?),
                 STRIPS if strips => Some(self.corners(element, &mut numbers, &mut to, Self::strip)?),
                 _ => {
-                    self.each_record(element, &mut numbers, |_, _, _| Ok(()))?;
+                    self.each_record(element, &mut numbers, |_, _| Ok(()))?;
                     None
                 }
             };
@@ -102,13 +101,13 @@ impl Job<'_> {
         OpenError::Scratch { path: self.source.path.to_owned(), folder: folder(), source }
     }
 
-    /// Reads the records of an element one by one. `take` gets the number of the record and all its numbers: those of
-    /// lists are behind one another, with their lengths before them.
+    /// Reads the records of an element one by one. `take` gets all numbers of a record, entries of lists among them, and
+    /// where those of each property start, with the end behind the last.
     fn each_record(
         &self,
         element: &Element,
         numbers: &mut impl Numbers,
-        mut take: impl FnMut(u64, &[Value], &[usize]) -> Result<(), OpenError>,
+        mut take: impl FnMut(&[Value], &[usize]) -> Result<(), OpenError>,
     ) -> Result<(), OpenError> {
         let (mut values, mut starts, mut told) = (Vec::new(), Vec::new(), numbers.read());
         for index in 0..element.count {
@@ -132,7 +131,7 @@ impl Job<'_> {
                 }
             }
             starts.push(values.len());
-            take(index, &values, &starts)?;
+            take(&values, &starts)?;
             if index % CHUNK == CHUNK - 1 {
                 self.source.passed(self.progress, (numbers.read() - told) as u64);
                 told = numbers.read();
@@ -168,7 +167,7 @@ impl Job<'_> {
         let scalar = |p: &Property| if let Kind::Number(scalar) = p.kind { Some(scalar) } else { None };
         let kept: Vec<(usize, Scalar)> =
             element.properties.iter().enumerate().filter_map(|(i, p)| Some((i, scalar(p)?))).collect();
-        self.each_record(element, numbers, |_, values, starts| {
+        self.each_record(element, numbers, |values, starts| {
             kept.iter().try_for_each(|&(i, scalar)| values[starts[i]].write(scalar, to)).map_err(|e| self.unwritten(e))
         })?;
         let properties = kept.iter().map(|&(i, _)| element.properties[i].clone()).collect();
@@ -188,7 +187,7 @@ impl Job<'_> {
             found.filter(|&i| matches!(element.properties[i].kind, Kind::List { entry, .. } if entry.is_integer()));
         let mut faces = 0;
         let mut kind = Kind::List { length: Scalar::U32, entry: Scalar::I32 };
-        self.each_record(element, numbers, |_, values, starts| {
+        self.each_record(element, numbers, |values, starts| {
             let Some(i) = place else { return Ok(()) };
             let Kind::List { entry, .. } = element.properties[i].kind else { return Ok(()) };
             kind = Kind::List { length: Scalar::U32, entry };
