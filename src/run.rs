@@ -9,7 +9,7 @@ use crate::index::{BuildRoom, Index};
 use crate::measure::Wanted;
 use crate::open::Reach;
 use crate::passes::{Probe, Recipe, Survey};
-use crate::pipeline::{Budget, Control, Crew, LostJob, beside, memory_there_bytes};
+use crate::pipeline::{Budget, Control, Crew, LostJob, beside, memory_there_bytes, return_free_memory};
 use crate::progress::{Progress, Unit};
 use crate::resume::{Curvature, ResumeError, WORK, WorkFolder, changes_since_finished, whole_identity};
 use crate::segment::smallest_grain_area_m2;
@@ -246,6 +246,7 @@ fn make_index(
 ) -> Result<Index, Error> {
     progress.begin("index", reach.triangles(), Unit::Triangles);
     let index = crew.pool.install(|| work.make_index(|shelf| Index::build(reach, shelf, room)))?;
+    return_free_memory();
     progress.advance(reach.triangles());
     progress.end();
     Ok(index)

@@ -17,7 +17,7 @@ mod budget;
 mod control;
 mod machine;
 
-pub use arena::share_one_heap;
+pub use arena::{return_free_memory, share_one_heap};
 pub use budget::{Budget, OverBudget, Reservation};
 pub use control::{Cancelled, Control, Interrupted};
 pub use machine::{cpu_seconds, memory_there_bytes, peak_memory_bytes};
