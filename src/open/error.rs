@@ -69,12 +69,12 @@ pub enum OpenError {
     /// The file has no vertices.
     #[error("{path}: has 0 vertices\nhelp: the mesh is empty; check the export")]
     NoVertices { path: String },
-    /// The file is a point cloud.
+    /// Some files are meshes and some are point clouds.
     #[error(
-        "{path}: has {vertices} vertices but no faces: it is a point cloud, which this version does not read yet\n\
-         help: mesh it first, for instance with Poisson reconstruction in CloudCompare or MeshLab"
+        "{mesh} is a mesh and {cloud} a point cloud: they cannot be one survey, since a cloud gets a surface of its own\n\
+         help: run the meshes and the clouds apart from each other"
     )]
-    PointCloud { path: String, vertices: u64 },
+    MeshAndCloud { mesh: String, cloud: String },
     /// A property is missing.
     #[error(
         "{path}: element `{element}` has no property `{property}` (it has: {found})\nhelp: export the mesh again with \
