@@ -2,6 +2,7 @@
 
 mod chunks;
 mod crs;
+mod draped;
 mod error;
 mod faces;
 mod frame;
@@ -23,6 +24,7 @@ mod warning;
 
 pub(crate) use chunks::{over_chunks, over_chunks_then, pieces};
 pub use crs::GeoReference;
+pub use draped::DrapedCloud;
 pub use error::OpenError;
 pub use frame::{Crs, Frame};
 pub use gdal_messages::{gdal_failures, listen_to_gdal};
