@@ -128,14 +128,8 @@ impl Settings {
         range(
             "surface.gap_spacings",
             surface.gap_spacings,
-            (1.0..=20.0).contains(&surface.gap_spacings),
-            "must lie in 1 to 20",
-        )?;
-        range(
-            "surface.steepest_deg",
-            surface.steepest_deg,
-            (45.0..=90.0).contains(&surface.steepest_deg),
-            "must lie in 45 to 90",
+            (0.7..=3.0).contains(&surface.gap_spacings),
+            "must lie in 0.7 to 3",
         )?;
         let c = &self.curvature;
         range("curvature.neighbours", c.neighbours, (1..=256).contains(&c.neighbours), "must lie in 1 to 256")?;

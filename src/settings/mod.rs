@@ -62,17 +62,14 @@ pub struct InputSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SurfaceSettings {
-    /// Radius of the widest empty circle that a triangle may span, in spacings of the points around it, 1 to 20. Wider
+    /// Radius of the widest empty circle that a triangle may span, in spacings of the points around it, 0.7 to 3. Wider
     /// gaps stay open.
     pub gap_spacings: f64,
-    /// A point is left out if another one, near it in plan, is above it and more steeply so than this, degrees from the
-    /// horizontal, 45 to 90: what is under overhangs. 90 leaves out none.
-    pub steepest_deg: f64,
 }
 
 impl Default for SurfaceSettings {
     fn default() -> Self {
-        SurfaceSettings { gap_spacings: 3.0, steepest_deg: 80.0 }
+        SurfaceSettings { gap_spacings: 2.0 }
     }
 }
 

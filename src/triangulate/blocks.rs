@@ -6,18 +6,24 @@ use std::ops::Range;
 
 /// Points of a block, at most, where cells can still be told apart. Neither threads nor memory change it, so that
 /// triangles have the same numbers in every run.
-const MOST_POINTS: u64 = 1 << 16;
+pub(super) const MOST_POINTS: u64 = 1 << 17;
 
 /// Points of a block with its halo, in eighths of those within.
-const HALO_FACTOR_EIGHTHS: u64 = 11;
+const HALO_FACTOR_EIGHTHS: u64 = 12;
 
 /// A block of cells.
 pub(super) struct Block {
     pub(super) columns: Range<u32>,
     pub(super) rows: Range<u32>,
+    /// Widest spacing of the points in it and around it, metres.
+    pub(super) spacing_m: f64,
 }
 
 impl Block {
+    fn of(columns: Range<u32>, rows: Range<u32>) -> Block {
+        Block { columns, rows, spacing_m: 0.0 }
+    }
+
     /// Whether a cell is in the block.
     pub(super) fn holds(&self, [column, row]: [u32; 2]) -> bool {
         self.columns.contains(&column) && self.rows.contains(&row)
@@ -29,6 +35,8 @@ pub(super) struct Blocks {
     pub(super) blocks: Vec<Block>,
     nodes: Vec<Node>,
     top: usize,
+    most_points: u64,
+    halo_spacings: f64,
 }
 
 /// Part of the survey: what it and its halo cover, metres in plan, and its halves or its block.
@@ -43,17 +51,17 @@ enum Part {
 }
 
 impl Blocks {
-    /// Cuts the survey. A block needs the points up to `halo_m` of its widest spacing around it.
-    pub(super) fn cut(density: &Density, halo_m: impl Fn(f64) -> f64) -> Blocks {
+    /// Cuts the survey into blocks of `most_points`. A block needs the points up to so many spacings around it.
+    pub(super) fn cut(density: &Density, most_points: u64, halo_spacings: f64) -> Blocks {
         let [columns, rows] = density.size();
-        let mut blocks = Blocks { blocks: Vec::new(), nodes: Vec::new(), top: 0 };
-        let all = Block { columns: 0..columns, rows: 0..rows };
-        blocks.top = blocks.add(density, all, &halo_m).unwrap_or(usize::MAX);
+        let mut blocks = Blocks { blocks: Vec::new(), nodes: Vec::new(), top: 0, most_points, halo_spacings };
+        let all = Block::of(0..columns, 0..rows);
+        blocks.top = blocks.add(density, all).unwrap_or(usize::MAX);
         blocks
     }
 
     /// Adds a part and its halves; none where it holds no points.
-    fn add(&mut self, density: &Density, part: Block, halo_m: &impl Fn(f64) -> f64) -> Option<usize> {
+    fn add(&mut self, density: &Density, part: Block) -> Option<usize> {
         let (width, height) = (part.columns.len(), part.rows.len());
         let along_rows = width >= height;
         // Points in each column, or row, of the longer side.
@@ -68,8 +76,8 @@ impl Blocks {
         if points == 0 {
             return None;
         }
-        if points <= MOST_POINTS || lines.len() == 1 {
-            return Some(self.add_block(density, part, halo_m));
+        if points <= self.most_points || lines.len() == 1 {
+            return Some(self.add_block(density, part));
         }
         let mut before = 0;
         let half = lines.iter().position(|n| {
@@ -78,15 +86,15 @@ impl Blocks {
         });
         // At least one line on each side.
         let cut = (half.unwrap_or(0) as u32 + 1).min(lines.len() as u32 - 1);
-        let Block { columns, rows } = part;
+        let Block { columns, rows, .. } = part;
         let halves = if along_rows {
             let middle = columns.start + cut;
-            [Block { columns: columns.start..middle, rows: rows.clone() }, Block { columns: middle..columns.end, rows }]
+            [Block::of(columns.start..middle, rows.clone()), Block::of(middle..columns.end, rows)]
         } else {
             let middle = rows.start + cut;
-            [Block { columns: columns.clone(), rows: rows.start..middle }, Block { columns, rows: middle..rows.end }]
+            [Block::of(columns.clone(), rows.start..middle), Block::of(columns, middle..rows.end)]
         };
-        let halves = halves.map(|half| self.add(density, half, halo_m));
+        let halves = halves.map(|half| self.add(density, half));
         match halves {
             [Some(a), Some(b)] => {
                 let sides = around(self.nodes[a].sides, self.nodes[b].sides);
@@ -97,12 +105,19 @@ impl Blocks {
         }
     }
 
-    fn add_block(&mut self, density: &Density, block: Block, halo_m: &impl Fn(f64) -> f64) -> usize {
-        let cells = block.rows.clone().flat_map(|row| block.columns.clone().map(move |column| [column, row]));
-        let occupied = cells.filter(|&cell| density.count(cell) > 0);
-        let widest_m = occupied.map(|cell| density.spacing_m(cell)).fold(0.0, f64::max);
+    fn add_block(&mut self, density: &Density, mut block: Block) -> usize {
+        // What lies around may be wider spaced, and then one must look further: until nothing new is found.
+        loop {
+            let halo_m = self.halo_spacings * block.spacing_m;
+            let [columns, rows] = density.grown(&block.columns, &block.rows, halo_m);
+            let spacing_m = density.widest_m(&columns, &rows);
+            if spacing_m <= block.spacing_m {
+                break;
+            }
+            block.spacing_m = spacing_m;
+        }
         let [low, high] = density.sides(&block.columns, &block.rows);
-        let halo_m = halo_m(widest_m);
+        let halo_m = self.halo_spacings * block.spacing_m;
         let sides = [low.map(|x| x - halo_m), high.map(|x| x + halo_m)];
         self.nodes.push(Node { sides, part: Part::Block(self.blocks.len() as u32) });
         self.blocks.push(block);

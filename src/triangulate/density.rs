@@ -1,6 +1,6 @@
-//! How far apart points lie, place by place.
+//! How far apart points lie in plan, place by place: how far one must look for the neighbours of a point.
 //!
-//! Points are counted in square cells, and cells four by four in larger ones, and so on. The spacing at a place is that
+//! Points are counted in square cells, and cells two by two in larger ones, and so on. The spacing at a place is that
 //! of evenly spread points in the smallest of these squares that holds enough of them. It depends on the survey only.
 
 use super::DrapeError;
@@ -14,8 +14,8 @@ use std::sync::{Mutex, PoisonError};
 const POINTS_PER_CELL: u64 = 8;
 /// Cells, at most: 45 MB with the larger squares.
 const MOST_CELLS: f64 = 8_388_608.0;
-/// Points by which a square is judged: their number then is right to a fifth where they are strewn at random.
-const ENOUGH: u32 = 32;
+/// Points by which a square is judged: so many that a wall in it, which has many points in little plan, does not tell.
+const ENOUGH: u32 = 1024;
 /// The spacing is nowhere taken for more than so many times that of the whole survey: stray points far from one another
 /// are no surface.
 const WIDEST: f64 = 8.0;
@@ -58,10 +58,16 @@ impl Density {
         let count: Vec<AtomicU32> = (0..columns as usize * rows as usize).map(|_| AtomicU32::new(0)).collect();
         let mut density = Density { min, cell_m, levels: Vec::new(), typical_m: 0.0 };
         density.levels.push(Level { columns, count: Vec::new() });
-        each_kept(cloud, keep, || (), |(), p| {
-            let [column, row] = density.cell(p, rows);
-            count[row as usize * columns as usize + column as usize].fetch_add(1, Ordering::Relaxed);
-        }, |()| ());
+        each_kept(
+            cloud,
+            keep,
+            || (),
+            |(), p| {
+                let [column, row] = density.cell(p, rows);
+                count[row as usize * columns as usize + column as usize].fetch_add(1, Ordering::Relaxed);
+            },
+            |()| (),
+        );
         density.levels[0].count = count.into_iter().map(AtomicU32::into_inner).collect();
         density.gather();
         let occupied = density.levels[0].count.iter().filter(|&&n| n > 0).count();
@@ -115,6 +121,27 @@ impl Density {
     pub(super) fn sides(&self, columns: &Range<u32>, rows: &Range<u32>) -> [[f64; 2]; 2] {
         let at = |axis: usize, cell: u32| self.min[axis] + f64::from(cell) * self.cell_m;
         [[at(0, columns.start), at(1, rows.start)], [at(0, columns.end), at(1, rows.end)]]
+    }
+
+    /// A block of cells and what lies up to so far around it.
+    pub(super) fn grown(&self, columns: &Range<u32>, rows: &Range<u32>, by_m: f64) -> [Range<u32>; 2] {
+        let cells = (by_m / self.cell_m).ceil() as u32;
+        let grow = |r: &Range<u32>, n: u32| r.start.saturating_sub(cells)..r.end.saturating_add(cells).min(n);
+        let [all_columns, all_rows] = self.size();
+        [grow(columns, all_columns), grow(rows, all_rows)]
+    }
+
+    /// Widest spacing in a block of cells, where it holds points, metres.
+    pub(super) fn widest_m(&self, columns: &Range<u32>, rows: &Range<u32>) -> f64 {
+        let cells = rows.clone().flat_map(|row| columns.clone().map(move |column| [column, row]));
+        cells.filter(|&cell| self.count(cell) > 0).map(|cell| self.spacing_m(cell)).fold(0.0, f64::max)
+    }
+
+    /// How far a place is from a block of cells, metres; 0 within.
+    pub(super) fn distance_m(&self, p: DVec3, columns: &Range<u32>, rows: &Range<u32>) -> f64 {
+        let [low, high] = self.sides(columns, rows);
+        let beyond = |x: f64, axis: usize| (low[axis] - x).max(x - high[axis]).max(0.0);
+        beyond(p.x, 0).hypot(beyond(p.y, 1))
     }
 
     /// Spacing of the points around a cell, metres.

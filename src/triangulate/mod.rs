@@ -1,36 +1,54 @@
-//! Triangulating: a point cloud gets a surface, seen from above.
+//! Triangulating: a point cloud gets a surface.
 //!
-//! The surface is that of the Delaunay triangulation in plan, without triangles across gaps. Every triangle is a matter
-//! of the points around it ([`delaunay`]), and so is whether a point is hidden ([`seen`]) and how wide a gap may be
-//! ([`density`]). The cloud is worked in blocks, each with all points that can matter to it, and every triangle is found
-//! by the block that holds its first corner: the surface is that of the cloud in one piece.
+//! Every triangle is a matter of the points around it: which way the surface faces there ([`normals`]), and which points
+//! are neighbours in it ([`umbrella`]). The cloud is worked in blocks, each with all points that can matter to it, and
+//! every triangle belongs to the block that holds its first corner: the surface is that of the cloud in one piece.
 //!
-//! What a surface of one height at each place cannot show is left out: what lies under overhangs, and walls below their
-//! rim, which become one strip of steep triangles.
+//! Walls and overhangs are part of the surface as far as points show them. Where several layers of points lie within a
+//! few spacings of one another, as in noisy clouds or under thin overhangs, it has holes.
 
 mod blocks;
-mod delaunay;
 mod density;
-mod seen;
+mod near;
+mod normals;
+#[cfg(test)]
+mod tests;
+mod umbrella;
 
 use crate::geometry::DVec3;
 use crate::open::{Surface, over_chunks_then, pieces};
 use crate::settings::SurfaceSettings;
 use crate::store::{Element, Scatter, Shelf, StoreError};
-use blocks::Blocks;
-use delaunay::{circle_radius_m, triangles};
+use blocks::{Block, Blocks};
 use density::Density;
 pub use density::Keep;
+use near::Near;
+use normals::{Facing, TURNS};
 use rayon::prelude::*;
-use seen::{Cover, from_above, one_for_each_place};
 use serde::{Deserialize, Serialize};
+use std::cmp::Ordering;
 use std::fs::File;
 use std::io::{BufWriter, Write};
+use umbrella::{Cell, ROUNDS, agreed};
 
-/// Points hide others within this many usual spacings.
-const COVER_SPACINGS: f64 = 2.0;
+/// Neighbours of a point that are looked at.
+const AROUND: usize = 24;
+/// How far they may be, in spacings of the points in plan. Steep planes look no further for others that tell which side
+/// is up.
+const REACH: f64 = 3.5;
+/// A point is covered from above by others this far away in plan, if they are so steeply above it: 80 degrees.
+const COVER_REACH: f64 = 1.5;
+const COVER_STEEPNESS: f64 = 5.67;
+/// How long a side of a triangle may be.
+const LONGEST: f64 = 2.5;
+/// What may change a triangle lies so far around it: the triangles next to it, and those next to them, round by round.
+const TRIANGLES_REACH: f64 = LONGEST * (1 + ROUNDS.len()) as f64;
+/// And what may change the side to which the planes of their corners face.
+const FACING_REACH: f64 = TRIANGLES_REACH + REACH * TURNS as f64;
+/// And the points that these planes are fitted to.
+const HALO: f64 = FACING_REACH + REACH;
 /// Memory for each point of a block while it is triangulated, bytes.
-const WORKING_BYTES: u64 = 400;
+const WORKING_BYTES: u64 = 250;
 /// Part of the room for points that wait for their block.
 const WAITING_SHARE: u64 = 2;
 
@@ -58,12 +76,6 @@ pub enum DrapeError {
         /// Their usual distance, metres.
         typical_m: f64,
     },
-    /// Coordinates that the triangulation cannot take.
-    #[error("the cloud cannot be triangulated: {message}")]
-    Coordinates {
-        /// What the triangulation says.
-        message: String,
-    },
     /// The work folder cannot be used.
     #[error(transparent)]
     Store(#[from] StoreError),
@@ -76,10 +88,8 @@ pub struct DrapeFigures {
     pub points: u64,
     /// Noise and withheld points, which are not used.
     pub skipped: u64,
-    /// Points at a place in plan where another one is, and is higher.
+    /// Points at the very place of another one.
     pub same_place: u64,
-    /// Points below a steep face or an overhang.
-    pub hidden: u64,
     /// Triangles of the surface.
     pub triangles: u64,
     /// Usual distance of neighbouring points, metres: the side of the square that one has.
@@ -122,12 +132,11 @@ impl Element for Site {
 struct Piece {
     triangles: Vec<[u64; 3]>,
     same_place: u64,
-    hidden: u64,
 }
 
 /// Lays a surface over the points that are to be kept, in about `room` bytes, on all threads of the pool.
 ///
-/// Triangles are seen counter-clockwise from above, and in the same order whatever the room and the threads.
+/// Triangles are seen counter-clockwise from outside, and in the same order whatever the room and the threads.
 ///
 /// # Errors
 /// No surface, or the disk says no.
@@ -137,14 +146,18 @@ pub fn drape(
     settings: &SurfaceSettings,
     (shelf, room): (&Shelf, u64),
 ) -> Result<Draped, DrapeError> {
+    drape_in_blocks(cloud, keep, settings, (shelf, room), blocks::MOST_POINTS)
+}
+
+fn drape_in_blocks(
+    cloud: &dyn Surface,
+    keep: Keep,
+    settings: &SurfaceSettings,
+    (shelf, room): (&Shelf, u64),
+    most_points: u64,
+) -> Result<Draped, DrapeError> {
     let (density, kept) = Density::of(cloud, keep)?;
-    let cover = Cover {
-        reach_m: COVER_SPACINGS * density.typical_m,
-        steepness: settings.steepest_deg.to_radians().tan(),
-    };
-    // A circle through a point of the block, and what hides a point within the circle.
-    let halo_m = |spacing_m: f64| 2.0 * settings.gap_spacings * spacing_m + cover.reach_m;
-    let blocks = Blocks::cut(&density, halo_m);
+    let blocks = Blocks::cut(&density, most_points, HALO);
     let scatter = scatter(cloud, keep, &blocks, (shelf, room / WAITING_SHARE))?;
     let largest = blocks.largest_points(&density);
     let together = (room / 2 / (WORKING_BYTES * largest)).clamp(1, 4 * rayon::current_num_threads() as u64);
@@ -161,12 +174,11 @@ pub fn drape(
     for wave in (0..blocks.blocks.len()).collect::<Vec<_>>().chunks(together as usize) {
         let work = |&i: &usize| {
             let sites: Vec<Site> = scatter.take(i)?.concat();
-            piece(sites, &density, &blocks.blocks[i], (settings.gap_spacings, cover))
+            Ok(piece(sites, &density, &blocks.blocks[i], settings.gap_spacings))
         };
-        let pieces = wave.par_iter().with_max_len(1).map(work).collect::<Result<Vec<_>, DrapeError>>()?;
+        let pieces = wave.par_iter().with_max_len(1).map(work).collect::<Result<Vec<_>, StoreError>>()?;
         for piece in pieces {
             figures.same_place += piece.same_place;
-            figures.hidden += piece.hidden;
             figures.triangles += piece.triangles.len() as u64;
             for number in piece.triangles.as_flattened() {
                 let bytes = number.to_le_bytes();
@@ -222,28 +234,39 @@ fn scatter(
 }
 
 /// The triangles whose first corner is in a block.
-fn piece(
-    sites: Vec<Site>,
-    density: &Density,
-    block: &blocks::Block,
-    (gap_spacings, cover): (f64, Cover),
-) -> Result<Piece, DrapeError> {
-    let here = |sites: &[Site]| sites.iter().filter(|s| block.holds(density.cell_of(s.at))).count() as u64;
-    let (mut sites, same_place) = one_for_each_place(sites);
-    let hidden = from_above(&mut sites, cover);
-    let (same_place, hidden) = (here(&same_place), here(&hidden));
-    let all = triangles(&sites).map_err(|e| DrapeError::Coordinates { message: e.to_string() })?;
-    let limit_m: Vec<f64> =
-        sites.iter().map(|s| gap_spacings * density.spacing_m(density.cell_of(s.at))).collect();
-    let is_ours = |corners: &[u32; 3]| {
-        let [a, b, c] = corners.map(|v| v as usize);
-        let limit_m = limit_m[a].min(limit_m[b]).min(limit_m[c]);
-        block.holds(density.cell_of(sites[a].at))
-            && circle_radius_m([&sites[a], &sites[b], &sites[c]]) <= limit_m
-    };
-    let mut triangles: Vec<[u32; 3]> = all.into_iter().filter(is_ours).collect();
-    // By place, so that the numbers of triangles are the same in every run.
-    triangles.sort_unstable();
-    let triangles = triangles.into_iter().map(|corners| corners.map(|v| sites[v as usize].input)).collect();
-    Ok(Piece { triangles, same_place, hidden })
+fn piece(mut sites: Vec<Site>, density: &Density, block: &Block, gap_spacings: f64) -> Piece {
+    // By place, so that points have the same order in every block, whatever that of the file is.
+    let key = |s: &Site| (s.at.x, s.at.y, s.at.z, s.input);
+    sites.sort_unstable_by(|a, b| key(a).partial_cmp(&key(b)).unwrap_or(Ordering::Equal));
+    let is_ours = |site: &Site| block.holds(density.cell_of(site.at));
+    let mut same_place = 0;
+    sites.dedup_by(|b, a| {
+        let same = a.at == b.at;
+        same_place += u64::from(same && is_ours(b));
+        same
+    });
+    let (near, mut facing) = (Near::new(&sites), Facing::new(sites.len()));
+    let (mut found, mut cell, mut proposed) = (Vec::new(), Cell::default(), Vec::new());
+    for (point, site) in sites.iter().enumerate() {
+        let distance_m = density.distance_m(site.at, &block.columns, &block.rows);
+        if distance_m > FACING_REACH * block.spacing_m {
+            continue;
+        }
+        let spacing_m = density.spacing_m(density.cell_of(site.at));
+        near.nearest(point, AROUND, REACH * spacing_m, &mut found);
+        let is_covered = || near.is_covered(point, COVER_REACH * spacing_m, COVER_STEEPNESS);
+        let normal = facing.fit(point, &sites, &found, is_covered);
+        if distance_m <= TRIANGLES_REACH * block.spacing_m {
+            // So many points in a circle of this radius.
+            let farthest2 = found.last().map_or(0.0, |n| n.0);
+            let own_m = (std::f64::consts::PI * farthest2 / found.len().max(1) as f64).sqrt();
+            let lengths_m = (own_m, gap_spacings * own_m, LONGEST * spacing_m);
+            cell.propose(point, (&sites, &found), normal, lengths_m, &mut proposed);
+        }
+    }
+    let turned = facing.turn();
+    drop((near, facing));
+    let ours = agreed(&sites, proposed, &turned).into_iter().filter(|corners| is_ours(&sites[corners[0] as usize]));
+    let triangles = ours.map(|corners| corners.map(|v| sites[v as usize].input)).collect();
+    Piece { triangles, same_place }
 }
