@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::forecast;
 use crate::index::{BuildRoom, Index};
 use crate::measure::Wanted;
-use crate::open::Reach;
+use crate::open::{Reach, resolve_inputs};
 use crate::passes::{Probe, Recipe, Survey};
 use crate::pipeline::{Budget, Control, Crew, LostJob, beside, memory_there_bytes, return_free_memory};
 use crate::progress::{Progress, Unit};
@@ -24,7 +24,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// What to run.
 #[derive(Debug, Clone)]
 pub struct Job {
-    /// Files of one survey.
+    /// Files of one survey, or folders, patterns and lists of them; see [`resolve_inputs`].
     pub inputs: Vec<PathBuf>,
     /// Folder for the results.
     pub out: PathBuf,
@@ -68,7 +68,8 @@ pub fn is_done(job: &Job) -> Result<bool, Error> {
         return Ok(false);
     }
     job.settings.check()?;
-    let open = || Reach::open(&job.inputs, &job.settings.input, &|_, _| {});
+    let inputs = resolve_inputs(&job.inputs)?;
+    let open = || Reach::open(&inputs.paths, &job.settings.input, &|_, _| {});
     let (reach, _) = pool(&job.settings)?.install(open)?;
     match changes_since_finished(&job.out, REPORT, &reach, &job.settings) {
         Some(changes) if changes.is_empty() => Ok(true),
@@ -89,17 +90,20 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let progress: &dyn Progress = &meter;
     let settings = &job.settings;
     settings.check()?;
+    let inputs = resolve_inputs(&job.inputs)?;
+    inputs.notes.iter().for_each(|note| progress.note(note));
     // Where there is nothing to resume, results that are there are not those of an interrupted run.
     let resumed = job.resume && WorkFolder::holds_run(job.work.as_deref(), &job.out);
     let folder = OutputFolder::create(&job.out, job.force || resumed, &[WORK])?;
-    folder.spare(&job.inputs)?;
+    folder.spare(&inputs.paths)?;
     let mut work = WorkFolder::open(job.work.as_deref(), &job.out)?;
     let (pool, memory) = (pool(settings)?, memory_bytes(settings));
     let (threads, instructions) = (pool.current_num_threads(), instructions(settings)?);
 
     // open
-    let (reach, warnings) = pool.install(|| open(job, progress))?;
+    let (reach, warnings) = pool.install(|| open(&inputs.paths, settings, progress))?;
     control.check()?;
+    reach.georeference().notes.iter().for_each(|note| progress.note(note));
     let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
     warnings.iter().for_each(|w| progress.warn(w));
     let mut findings = work.begin(&reach, settings, job.resume)?;
@@ -294,11 +298,15 @@ fn spacing_m(survey: &Survey, crew: &Crew, progress: &dyn Progress) -> Result<f6
     if spacing_m > 0.0 { Ok(spacing_m) } else { Err(Error::NoSpacing) }
 }
 
-fn open(job: &Job, progress: &dyn Progress) -> Result<(Reach, Vec<crate::open::Warning>), Error> {
-    let bytes: u64 = job.inputs.iter().filter_map(|p| std::fs::metadata(p).ok()).map(|m| m.len()).sum();
+fn open(
+    inputs: &[PathBuf],
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<(Reach, Vec<crate::open::Warning>), Error> {
+    let bytes: u64 = inputs.iter().filter_map(|p| std::fs::metadata(p).ok()).map(|m| m.len()).sum();
     progress.begin("open", bytes, Unit::Bytes);
     let told = AtomicU64::new(0);
-    let opened = Reach::open(&job.inputs, &job.settings.input, &|done, _| {
+    let opened = Reach::open(inputs, &settings.input, &|done, _| {
         let before = told.fetch_max(done, Ordering::Relaxed);
         progress.advance(done.saturating_sub(before));
     });
@@ -371,6 +379,7 @@ fn facts(reach: &Reach, index: &Index, plan: &Plan, warnings: &[String], lost: &
         .collect();
     serde_json::json!({
         "inputs": inputs,
+        "georeference": reach.georeference(),
         "warnings": warnings,
         "lost_tiles": lost,
         "tiles": plan.tiles.len(),

@@ -1,8 +1,8 @@
 //! A survey: one or several files in one frame.
 
-use super::crs::GeoReference;
 use super::error::OpenError;
 use super::frame::Frame;
+use super::georeference::{Georeference, SideFiles};
 use super::mapped::MappedFile;
 use super::ply::PlyMesh;
 use super::precision::{COARSEST_STEP_IN_EDGES, coarsest_step};
@@ -23,6 +23,7 @@ use std::path::PathBuf;
 #[derive(Debug)]
 pub struct Reach {
     files: Vec<SurveyFile>,
+    georeference: Georeference,
     frame: Frame,
     bounds: ([f64; 3], [f64; 3]),
     full_color: Option<f64>,
@@ -54,15 +55,16 @@ impl Reach {
         input: &InputSettings,
         progress: &(dyn Fn(u64, u64) + Sync),
     ) -> Result<(Reach, Vec<Warning>), OpenError> {
-        let reference = GeoReference::from_setting(&input.crs)?;
+        // Before the files: what is wrong with a side file is told at once.
+        let georeference = SideFiles::read(paths, input)?.resolve(&[])?;
         let files = open_files(paths, progress)?;
         let bounds = joint_bounds(&files);
-        let frame = make_frame(input, reference, &bounds);
+        let frame = georeference.frame(bounds.0);
         check_extent(&files, &frame, &bounds)?;
         let bytes = files.iter().all(|f| f.color_type() == Some(Scalar::U8));
         let has_colors = files.iter().all(|f| f.color_type().is_some());
         let full_color = has_colors.then_some(if bytes { 255.0 } else { 1.0 });
-        let reach = Reach { files, frame, bounds, full_color };
+        let reach = Reach { files, georeference, frame, bounds, full_color };
         let edges_m: Vec<_> = reach.files.iter().map(|file| reach.sampled_edge_m(file)).collect();
         reach.check_precision(&edges_m)?;
         let warnings = reach.warnings(input, &edges_m);
@@ -72,6 +74,11 @@ impl Reach {
     /// From input to local to map.
     pub fn frame(&self) -> &Frame {
         &self.frame
+    }
+
+    /// Where the survey is, and who said so.
+    pub fn georeference(&self) -> &Georeference {
+        &self.georeference
     }
 
     /// The files, in the order given.
@@ -324,23 +331,6 @@ fn joint_bounds(files: &[SurveyFile]) -> ([f64; 3], [f64; 3]) {
     files.iter().map(SurveyFile::input_bounds).fold(([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]), |a, b| {
         (std::array::from_fn(|i| a.0[i].min(b.0[i])), std::array::from_fn(|i| a.1[i].max(b.1[i])))
     })
-}
-
-fn make_frame(input: &InputSettings, reference: Option<GeoReference>, bounds: &([f64; 3], [f64; 3])) -> Frame {
-    let metres_per_map_unit = reference.as_ref().map_or(1.0, |r| r.metres_per_unit);
-    let metres_per_input_unit = match input.unit {
-        Unit::Auto => metres_per_map_unit,
-        Unit::M => 1.0,
-        Unit::Mm => 1e-3,
-        Unit::Ft => 0.3048,
-    };
-    Frame {
-        origin_input: bounds.0.map(f64::floor),
-        metres_per_input_unit,
-        offset_map: input.offset,
-        metres_per_map_unit,
-        crs: reference.map(|r| r.crs),
-    }
 }
 
 fn check_extent(files: &[SurveyFile], frame: &Frame, bounds: &([f64; 3], [f64; 3])) -> Result<(), OpenError> {
