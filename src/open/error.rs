@@ -21,19 +21,29 @@ pub enum OpenError {
     )]
     NoSurveysInFolder { path: String, found: String },
     /// A folder with a survey in two formats.
-    #[error("{one} and {other} have one name: if they are the same survey, every grain would count twice\nhelp: name the files that are meant, for instance with a pattern")]
+    #[error(
+        "{one} and {other} have one name: if they are the same survey, every grain would count twice\nhelp: name the files that are meant, for instance with a pattern"
+    )]
     TwoFormats { one: String, other: String },
     /// A pattern that is none.
-    #[error("{pattern}: there is no such file, and as a pattern it cannot be understood: {reason}\nhelp: patterns have * for any letters, ? for one, [ab] for one of these")]
+    #[error(
+        "{pattern}: there is no such file, and as a pattern it cannot be understood: {reason}\nhelp: patterns have * for any letters, ? for one, [ab] for one of these"
+    )]
     Pattern { pattern: String, reason: String },
     /// A pattern that leads nowhere.
-    #[error("{pattern}: nothing matches this pattern{but}\nhelp: check it from the working directory; * does not go into folders, and small letters are not capital ones")]
+    #[error(
+        "{pattern}: nothing matches this pattern{but}\nhelp: check it from the working directory; * does not go into folders, and small letters are not capital ones"
+    )]
     NoMatch { pattern: String, but: &'static str },
     /// A list of inputs that cannot be read.
-    #[error("@{path}: the list of inputs cannot be read: {source}\nhelp: name a text file with one path on a line, relative to its own folder")]
+    #[error(
+        "@{path}: the list of inputs cannot be read: {source}\nhelp: name a text file with one path on a line, relative to its own folder"
+    )]
     InputList { path: String, source: std::io::Error },
     /// A list of inputs without any.
-    #[error("@{path}: the list of inputs names no file\nhelp: write one path on a line, relative to the folder of the list")]
+    #[error(
+        "@{path}: the list of inputs names no file\nhelp: write one path on a line, relative to the folder of the list"
+    )]
     InputListEmpty { path: String },
     /// The path is a directory.
     #[error("{path}: is a directory, not a mesh\nhelp: name the files in it, for instance {path}/*.ply")]
@@ -77,6 +87,11 @@ pub enum OpenError {
          free some space there, or set TMPDIR to a folder with room for about the file's size"
     )]
     Scratch { path: String, folder: String, source: std::io::Error },
+    /// The triangles of a cloud cannot be read again.
+    #[error(
+        "the surface of the cloud cannot be mapped: {source}\nhelp: give the process more address space (ulimit -v)"
+    )]
+    Surface { source: std::io::Error },
     /// An element is declared twice.
     #[error(
         "{path}: the header declares element `{element}` twice\nhelp: export the mesh again with one `{element}` element"
@@ -90,12 +105,12 @@ pub enum OpenError {
     /// The file has no vertices.
     #[error("{path}: has 0 vertices\nhelp: the mesh is empty; check the export")]
     NoVertices { path: String },
-    /// The file is a point cloud.
+    /// Some files are meshes and some are point clouds.
     #[error(
-        "{path}: has {vertices} vertices but no faces: it is a point cloud, which this version does not read yet\n\
-         help: mesh it first, for instance with Poisson reconstruction in CloudCompare or MeshLab"
+        "{mesh} is a mesh and {cloud} a point cloud: they cannot be one survey, since a cloud gets a surface of its own\n\
+         help: run the meshes and the clouds apart from each other"
     )]
-    PointCloud { path: String, vertices: u64 },
+    MeshAndCloud { mesh: String, cloud: String },
     /// A property is missing.
     #[error(
         "{path}: element `{element}` has no property `{property}` (it has: {found})\nhelp: export the mesh again with \
@@ -161,6 +176,13 @@ pub enum OpenError {
          shifted to small ones, with the shift given as --offset or --offset-file"
     )]
     FloatStep { path: String, largest: f64, step_m: f64, edge_m: f64 },
+    /// Coordinates with too few digits.
+    #[error(
+        "{path}: coordinates as large as {largest} are printed in steps of {step_m} m, but the mean edge is only {edge_m:.3e} m \
+         long: the surface is destroyed\nhelp: export it again with more digits, or as binary PLY with double \
+         coordinates, or shifted to small ones, with the shift given as --offset or --offset-file"
+    )]
+    PrintedStep { path: String, largest: f64, step_m: f64, edge_m: f64 },
 
     /// A CRS that is neither code, text nor file.
     #[error("{origin}: is neither EPSG:n, nor WKT, nor a file\nhelp: give a code such as EPSG:2193 or a .prj file")]

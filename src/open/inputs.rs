@@ -112,14 +112,12 @@ impl Inputs {
     }
 
     fn add_pattern(&mut self, pattern: &str) -> Result<(), OpenError> {
-        let matches =
-            glob::glob(pattern).map_err(|e| OpenError::Pattern { pattern: pattern.to_owned(), reason: e.to_string() })?;
+        let matches = glob::glob(pattern)
+            .map_err(|e| OpenError::Pattern { pattern: pattern.to_owned(), reason: e.to_string() })?;
         let mut files = Vec::new();
         for found in matches {
-            let file = found.map_err(|e| OpenError::Unreadable {
-                path: e.path().display().to_string(),
-                source: e.into(),
-            })?;
+            let file =
+                found.map_err(|e| OpenError::Unreadable { path: e.path().display().to_string(), source: e.into() })?;
             if !file.is_dir() {
                 files.push(file);
             }
