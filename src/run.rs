@@ -8,6 +8,7 @@ use crate::forecast;
 use crate::index::{BuildRoom, Index};
 use crate::measure::Wanted;
 use crate::open::{Reach, Surface, resolve_inputs};
+use crate::opening::open_survey;
 use crate::passes::{Probe, Recipe, Survey};
 use crate::pipeline::{Budget, Control, Crew, LostJob, beside, memory_there_bytes, return_free_memory};
 use crate::progress::{Progress, Unit};
@@ -21,7 +22,6 @@ use crate::surfaces::WholeSurface;
 use crate::tile::Plan;
 use crate::write::{OutputFolder, REPORT, Results, WholeMesh, WriteError, write_unnamed};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
 
 /// What to run.
 #[derive(Debug, Clone)]
@@ -93,7 +93,6 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let settings = &job.settings;
     settings.check()?;
     let inputs = resolve_inputs(&job.inputs)?;
-    inputs.notes.iter().for_each(|note| progress.note(note));
     // Where there is nothing to resume, results that are there are not those of an interrupted run.
     let resumed = job.resume && WorkFolder::holds_run(job.work.as_deref(), &job.out);
     let folder = OutputFolder::create(&job.out, job.force || resumed, &[WORK])?;
@@ -104,9 +103,8 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let labelled = settings.output.labelled_mesh;
 
     // open
-    let (reach, warnings) = pool.install(|| open(&inputs.paths, settings, progress))?;
+    let (reach, warnings) = pool.install(|| open_survey(&inputs, &settings.input, progress))?;
     control.check()?;
-    reach.georeference().notes.iter().for_each(|note| progress.note(note));
     let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
     warnings.iter().for_each(|w| progress.warn(w));
     let mut findings = work.begin(&reach, settings, job.resume)?;
@@ -313,22 +311,6 @@ fn spacing_m(survey: &Survey, crew: &Crew, progress: &dyn Progress) -> Result<f6
     let (spacing_m, lost) = survey.spacing(crew, progress)?;
     none_lost("spacing", lost)?;
     if spacing_m > 0.0 { Ok(spacing_m) } else { Err(Error::NoSpacing) }
-}
-
-fn open(
-    inputs: &[PathBuf],
-    settings: &Settings,
-    progress: &dyn Progress,
-) -> Result<(Reach, Vec<crate::open::Warning>), Error> {
-    let bytes: u64 = inputs.iter().filter_map(|p| std::fs::metadata(p).ok()).map(|m| m.len()).sum();
-    progress.begin("open", bytes, Unit::Bytes);
-    let told = AtomicU64::new(0);
-    let opened = Reach::open(inputs, &settings.input, &|done, _| {
-        let before = told.fetch_max(done, Ordering::Relaxed);
-        progress.advance(done.saturating_sub(before));
-    });
-    progress.end();
-    Ok(opened?)
 }
 
 /// Refuses what cannot be written before the long work begins.
