@@ -245,13 +245,10 @@ fn prj_text(path: &Path) -> Result<String, OpenError> {
 }
 
 fn unit_name(metres: f64) -> String {
-    match metres {
-        m if m == 1.0 => "metre".to_owned(),
-        m if m == 1e-3 => "millimetre".to_owned(),
-        m if m == FOOT_M => "international foot".to_owned(),
-        m if m == US_SURVEY_FOOT_M => "US survey foot".to_owned(),
-        m => format!("unit of {m} m"),
-    }
+    let names =
+        [(1.0, "metre"), (1e-3, "millimetre"), (FOOT_M, "international foot"), (US_SURVEY_FOOT_M, "US survey foot")];
+    let name = names.into_iter().find(|(length_m, _)| *length_m == metres).map(|(_, name)| name.to_owned());
+    name.unwrap_or_else(|| format!("unit of {metres} m"))
 }
 
 /// What was applied to a survey's coordinates, and where each part came from.

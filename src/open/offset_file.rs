@@ -202,9 +202,8 @@ fn plain(lines: &[Line<'_>]) -> Result<OffsetFile, Flaw> {
         nothing_behind(lines, 1, PLAIN_EXAMPLE)?;
         return Ok(OffsetFile { form, offset, crs: None });
     }
-    nothing_behind(lines, 3, PLAIN_EXAMPLE)?;
     let mut single = Vec::new();
-    for &line in lines {
+    for &line in lines.iter().take(3) {
         let words = words(line)?;
         if words.len() != 1 {
             let found = format!("there are {} numbers below a line of one", words.len());
@@ -213,6 +212,7 @@ fn plain(lines: &[Line<'_>]) -> Result<OffsetFile, Flaw> {
         numbers(line, &words, expected, PLAIN_EXAMPLE)?;
         single.extend(words);
     }
+    nothing_behind(lines, 3, PLAIN_EXAMPLE)?;
     let last = lines[lines.len() - 1];
     Ok(OffsetFile { form, offset: shifts(last, &single, expected, PLAIN_EXAMPLE)?, crs: None })
 }

@@ -84,9 +84,9 @@ pub(super) fn check_precision(
     Ok(None)
 }
 
-/// Nothing in this world is steeper, edge for edge: tan 89.4°. Gravel in degrees is steeper by far, for a degree is
-/// 111 km: flat ground of which each edge rises a thousandth of its length already comes to 111.
-const STEEPEST: f64 = 100.0;
+/// Nothing in this world is steeper, edge for edge: tan 89.9°. Gravel in degrees is steeper by far, for a degree is
+/// 111 km: where edges rise a twentieth of their length, which is little for gravel, it comes to 5,000.
+const STEEPEST: f64 = 500.0;
 /// No degrees are larger, whichever way longitudes are counted and whichever comes first.
 const LARGEST_DEGREES: f64 = 360.0;
 

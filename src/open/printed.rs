@@ -59,8 +59,11 @@ impl PrintedDigits {
         axis.finer_than_floats += u64::from(off > 0.51 * 10f64.powi(-decimals));
     }
 
-    /// The step at which the largest numbers of an axis are printed; `None` if all are zero.
+    /// The step at which the largest numbers of an axis are printed; `None` if too few are not zero to tell.
     pub(super) fn step(&self, axis: usize) -> Option<f64> {
+        if self.axes[axis].numbers < TELLING {
+            return None;
+        }
         let mut seen: Option<(u64, i32)> = None;
         for decade in self.axes[axis].decades.iter().rev().filter(|d| d.numbers > 0) {
             let (numbers, decimals) = seen.unwrap_or((0, decade.decimals));
@@ -130,6 +133,7 @@ mod tests {
         let with_round = values(1.0).map(|v| format!("{v:.4}")).chain(["100".to_owned()]);
         assert_eq!(digits(with_round).step(0), Some(1e-4));
         assert_eq!(digits(std::iter::repeat_n("0".to_owned(), 50)).step(0), None);
+        assert_eq!(digits(values(1.0).take(5).map(|v| format!("{v:.1}"))).step(0), None);
     }
 
     #[test]

@@ -149,7 +149,7 @@ fn prj_files_of_several_surveys_must_be_one_system_but_not_one_text() {
     assert_contains(reach.georeference().crs_from.as_ref().expect("a source"), &["a.prj"]);
     std::fs::write(site.path("c.prj"), UTM_33).expect("write");
     let message = refusal(site.open(&names, &InputSettings::default()));
-    assert_contains(&message, &["a.prj says", "New_Zealand", "c.prj says", "EPSG:32633", "--crs"]);
+    assert_contains(&message, &["a.prj says", "New Zealand", "c.prj says", "EPSG:32633", "--crs"]);
 }
 
 fn candidate(source: CrsSource, text: &str) -> CrsCandidate {
