@@ -219,7 +219,7 @@ pub enum OpenError {
     CrsContradiction { first: String, first_name: String, second: String, second_name: String, help: &'static str },
     /// An offset file that is none.
     #[error(
-        "{path}: line {line}: {found}; {expected} was expected\nhelp: an offset file holds, for instance,\n{example}"
+        "{path}: line {line}: {found}, where this is expected: {expected}\nhelp: an offset file holds, for instance,\n{example}"
     )]
     OffsetFile { path: String, line: usize, found: String, expected: String, example: String },
     /// An offset file that cannot be read.

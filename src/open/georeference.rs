@@ -190,10 +190,12 @@ impl SideFiles {
         if metres_per_map_unit != 1.0
             && let Some(named) = &named
         {
-            let meant = if self.unit == Unit::Auto { "taken to be the same" } else { "as --unit says" };
+            let input = match self.unit {
+                Unit::Auto => "and the coordinates are taken to have it as well".to_owned(),
+                _ => format!("and the coordinates the {input_unit}, as --unit says"),
+            };
             notes.push(format!(
-                "the unit of {} is the {unit}, {metres_per_map_unit} m; that of the coordinates is the {input_unit}, \
-                 {meant}; grains are measured in metres",
+                "{} has the {unit} of {metres_per_map_unit} m as its unit, {input}; grains are measured in metres",
                 named.title()
             ));
         }
