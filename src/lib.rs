@@ -47,6 +47,7 @@ pub mod demo;
 pub mod error;
 pub mod forecast;
 pub mod inspect;
+pub mod opening;
 pub mod passes;
 pub mod resume;
 pub mod run;

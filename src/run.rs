@@ -7,7 +7,8 @@ use crate::error::Error;
 use crate::forecast;
 use crate::index::{BuildRoom, Index};
 use crate::measure::Wanted;
-use crate::open::{Reach, Surface};
+use crate::open::{Reach, Surface, resolve_inputs};
+use crate::opening::open_survey;
 use crate::passes::{Probe, Recipe, Survey};
 use crate::pipeline::{Budget, Control, Crew, LostJob, beside, memory_there_bytes, return_free_memory};
 use crate::progress::{Progress, Unit};
@@ -21,12 +22,11 @@ use crate::surfaces::WholeSurface;
 use crate::tile::Plan;
 use crate::write::{OutputFolder, REPORT, Results, WholeMesh, WriteError, write_unnamed};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
 
 /// What to run.
 #[derive(Debug, Clone)]
 pub struct Job {
-    /// Files of one survey.
+    /// Files of one survey, or folders, patterns and lists of them; see [`resolve_inputs`].
     pub inputs: Vec<PathBuf>,
     /// Folder for the results.
     pub out: PathBuf,
@@ -70,7 +70,8 @@ pub fn is_done(job: &Job) -> Result<bool, Error> {
         return Ok(false);
     }
     job.settings.check()?;
-    let open = || Reach::open(&job.inputs, &job.settings.input, &|_, _| {});
+    let inputs = resolve_inputs(&job.inputs)?;
+    let open = || Reach::open(&inputs.paths, &job.settings.input, &|_, _| {});
     let (reach, _) = pool(&job.settings)?.install(open)?;
     match changes_since_finished(&job.out, REPORT, &reach, &job.settings) {
         Some(changes) if changes.is_empty() => Ok(true),
@@ -91,17 +92,18 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let progress: &dyn Progress = &meter;
     let settings = &job.settings;
     settings.check()?;
+    let inputs = resolve_inputs(&job.inputs)?;
     // Where there is nothing to resume, results that are there are not those of an interrupted run.
     let resumed = job.resume && WorkFolder::holds_run(job.work.as_deref(), &job.out);
     let folder = OutputFolder::create(&job.out, job.force || resumed, &[WORK])?;
-    folder.spare(&job.inputs)?;
+    folder.spare(&inputs.paths)?;
     let mut work = WorkFolder::open(job.work.as_deref(), &job.out)?;
     let (pool, memory) = (pool(settings)?, memory_bytes(settings));
     let (threads, instructions) = (pool.current_num_threads(), instructions(settings)?);
     let labelled = settings.output.labelled_mesh;
 
     // open
-    let (reach, warnings) = pool.install(|| open(job, progress))?;
+    let (reach, warnings) = pool.install(|| open_survey(&inputs, &settings.input, progress))?;
     control.check()?;
     let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
     warnings.iter().for_each(|w| progress.warn(w));
@@ -198,7 +200,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
         whole = Some(surface(&work.surface_shelf()?)?);
     }
     let mesh = WholeMesh::new(&reach, whole.as_ref().and_then(WholeSurface::cloud));
-    let scale = index.scale.clone();
+    let scale = index.scale;
     let surveyed = index.triangles.occupied(&index.grid);
     let results = Results {
         frame: reach.frame(),
@@ -311,18 +313,6 @@ fn spacing_m(survey: &Survey, crew: &Crew, progress: &dyn Progress) -> Result<f6
     if spacing_m > 0.0 { Ok(spacing_m) } else { Err(Error::NoSpacing) }
 }
 
-fn open(job: &Job, progress: &dyn Progress) -> Result<(Reach, Vec<crate::open::Warning>), Error> {
-    let bytes: u64 = job.inputs.iter().filter_map(|p| std::fs::metadata(p).ok()).map(|m| m.len()).sum();
-    progress.begin("open", bytes, Unit::Bytes);
-    let told = AtomicU64::new(0);
-    let opened = Reach::open(&job.inputs, &job.settings.input, &|done, _| {
-        let before = told.fetch_max(done, Ordering::Relaxed);
-        progress.advance(done.saturating_sub(before));
-    });
-    progress.end();
-    Ok(opened?)
-}
-
 /// Refuses what cannot be written before the long work begins.
 fn check_outputs(reach: &Reach, index: &Index, settings: &Settings) -> Result<(), Error> {
     if settings.raster.cell_m > 0.0 {
@@ -388,6 +378,7 @@ fn facts(reach: &Reach, index: &Index, plan: &Plan, warnings: &[String], lost: &
         .collect();
     serde_json::json!({
         "inputs": inputs,
+        "georeference": reach.georeference(),
         "warnings": warnings,
         "lost_tiles": lost,
         "tiles": plan.tiles.len(),

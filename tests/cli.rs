@@ -149,7 +149,9 @@ fn every_flag_gives_the_settings_of_its_key_and_wins_over_set_and_file() {
         ("--crs EPSG:2193", "--set input.crs=EPSG:2193"),
         ("--offset 1,-2.5,3", "--set input.offset=[1.0,-2.5,3.0]"),
         ("--offset -1,2", "--set input.offset=[-1.0,2.0,0.0]"),
+        ("--offset-file coords.txt", "--set input.offset_file=coords.txt"),
         ("--unit mm", "--set input.unit=mm"),
+        ("--unit us-ft", "--set input.unit=us-ft"),
         ("--max-grain 1.25", "--set segment.max_grain_m=1.25"),
         ("--min-grain-area 0.005", "--set segment.min_grain_area_m2=5e-3"),
         ("--tile-size 12.5", "--set work.tile_size_m=12.5"),
@@ -215,10 +217,19 @@ fn inputs_that_cannot_be_read_end_with_code_1_name_the_path_and_help() {
     let missing = folder.path().join("missing.ply");
     let out = folder.path().join("out");
     run(&missing, &out, &[]).fails(1, &["missing.ply", "there is no such file", "\nhelp: "]);
-    let path = folder.path().to_str().unwrap();
-    run(folder.path(), &out, &[]).fails(1, &[path, "is a directory", "\nhelp: "]);
+    let empty = tempfile::tempdir().unwrap();
+    run(empty.path(), &out, &[]).fails(1, &[empty.path().to_str().unwrap(), "the folder is empty", "\nhelp: "]);
+    std::fs::write(empty.path().join("photo.jpg"), "x").unwrap();
+    run(empty.path(), &out, &[]).fails(1, &["holds 1 .jpg, but no *.ply", "\nhelp: "]);
+    run(&empty.path().join("*.ply"), &out, &[]).fails(1, &["*.ply: nothing matches", "\nhelp: "]);
+    run(Path::new("@nowhere.txt"), &out, &[]).fails(1, &["@nowhere.txt", "cannot be read", "\nhelp: "]);
     run(&mesh, &out, &["--crs", "EPSG:999999"]).fails(2, &["EPSG:999999", "\nhelp: "]);
     run(&mesh, &out, &["--crs", "EPSG:4326"]).fails(2, &["not a projected system", "\nhelp: "]);
+    let offset = folder.path().join("offset.txt");
+    std::fs::write(&offset, "far away").unwrap();
+    let offset = offset.to_str().unwrap();
+    run(&mesh, &out, &["--offset-file", offset]).fails(2, &["offset.txt: line 1: `far`", "500000 4600000", "\nhelp: "]);
+    run(&mesh, &out, &["--offset-file", offset, "--offset", "1,2"]).fails(2, &["only one of them", "\nhelp: "]);
     assert!(!out.exists());
     // Found out when the survey is indexed: the index is kept for the run that follows.
     run(&mesh, &out, &["--set", "raster.cell_m=1e-5"]).fails(2, &["raster.cell_m", "\nhelp: "]);
@@ -369,8 +380,86 @@ fn inspect_tells_people_and_programs_the_same() {
     assert!(plain.out.contains("bed.ply") && plain.out.contains("survey (1 file)"), "{}", plain.out);
     let scaled = gravelometer(words(&format!("inspect {} --unit mm --crs EPSG:2193 --json", mesh.display())));
     let value: serde_json::Value = serde_json::from_str(&scaled.out).unwrap();
-    assert_eq!(value["survey"]["metres_per_input_unit"], 1e-3);
-    assert_eq!(value["survey"]["crs_code"], "EPSG:2193");
+    assert_eq!(value["survey"]["georeference"]["metres_per_input_unit"], 1e-3);
+    assert_eq!(value["survey"]["georeference"]["authority"], "EPSG:2193");
+}
+
+#[test]
+fn what_lies_beside_a_survey_is_applied_and_recorded_by_run_and_inspect_alike() {
+    let (folder, mesh) = scene();
+    let coords = folder.path().join("coords.txt");
+    std::fs::write(&coords, "WGS84 UTM 59S\n480000 4420000\n1 2 3\n").unwrap();
+    let coords = coords.to_str().unwrap();
+    std::fs::write(folder.path().join("bed.prj"), "EPSG:32759").unwrap();
+    let out = folder.path().join("out");
+    let said = run(&mesh, &out, &["--offset-file", coords]);
+    assert_eq!(said.code, 0, "{}", said.err);
+    let report: serde_json::Value = serde_json::from_slice(&std::fs::read(out.join("run.json")).unwrap()).unwrap();
+    let place = &report["facts"]["georeference"];
+    assert_eq!((&place["crs"], &place["authority"]), (&"WGS 84 / UTM zone 59S".into(), &"EPSG:32759".into()));
+    assert_eq!(place["offset_map_units"], serde_json::json!([480_000.0, 4_420_000.0, 0.0]));
+    assert_eq!((&place["unit"], &place["metres_per_map_unit"]), (&"metre".into(), &1.0.into()));
+    assert_eq!(place["vertical_shift_map_units"], 0.0);
+    for (from, name) in [("crs_from", "coords.txt"), ("offset_from", "coords.txt (OpenDroneMap)")] {
+        assert!(place[from].as_str().unwrap().contains(name), "{place}");
+        assert!(said.err.contains(name), "{}", said.err);
+    }
+    let inspect = |more: &[&str]| {
+        let mut args = vec!["inspect", mesh.to_str().unwrap(), "--offset-file", coords];
+        args.extend(more);
+        gravelometer(args)
+    };
+    let json: serde_json::Value = serde_json::from_str(&inspect(&["--json"]).out).unwrap();
+    assert_eq!(&json["survey"]["georeference"], place);
+    let text = inspect(&[]).out;
+    for part in ["(EPSG:32759), from ", "480000, 4420000, 0 map units, from ", "metre (the CRS)", "note: the CRS is"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    // What the side files say is part of what was run; how they are called is not.
+    let again = |offset_file: &str| run(&mesh, &out, &["--offset-file", offset_file, "--resume"]);
+    assert!(again(coords).err.contains("nothing is left to do"));
+    let copy = folder.path().join("copy.txt");
+    std::fs::copy(coords, &copy).unwrap();
+    assert!(again(copy.to_str().unwrap()).err.contains("nothing is left to do"));
+    std::fs::write(coords, "WGS84 UTM 59S\n480001 4420000\n").unwrap();
+    again(coords).fails(2, &["input.offset was \"[480000.0, 4420000.0, 0.0]\"", "480001", "\nhelp: "]);
+    std::fs::write(coords, "480000 4420000\n").unwrap();
+    std::fs::write(folder.path().join("bed.prj"), "EPSG:32760").unwrap();
+    again(coords).fails(2, &["input.crs was", "EPSG:32759", "EPSG:32760"]);
+}
+
+#[test]
+fn a_folder_a_pattern_and_a_list_are_the_files_in_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let blocks = folder.path().join("blocks");
+    std::fs::create_dir(&blocks).unwrap();
+    let mut second = bed(22, 40, 40);
+    second.positions.iter_mut().for_each(|p| p.x += 5.0);
+    write_ply(&blocks.join("b10.ply"), &second);
+    write_ply(&blocks.join("b2.PLY"), &bed(21, 40, 40));
+    std::fs::write(blocks.join("labelled_mesh.ply"), "of a run").unwrap();
+    std::fs::write(blocks.join("notes.txt"), "mine").unwrap();
+    let list = folder.path().join("list.txt");
+    std::fs::write(&list, "# from south to north\nblocks/b10.ply\n\nblocks/b2.PLY\n").unwrap();
+    let grains = |name: &str, inputs: &[&Path]| {
+        let out = folder.path().join(name);
+        let mut args: Vec<_> = inputs.iter().map(|path| path.as_os_str().to_owned()).collect();
+        args.splice(0..0, ["run".into()]);
+        args.extend(["-o".into(), out.as_os_str().to_owned()]);
+        let said = gravelometer(args);
+        assert_eq!(said.code, 0, "{name}: {}", said.err);
+        (std::fs::read_to_string(out.join("grains.csv")).unwrap(), said.err)
+    };
+    let (named, _) = grains("named", &[&blocks.join("b10.ply"), &blocks.join("b2.PLY")]);
+    assert!(named.lines().count() > 2, "{named}");
+    let (of_folder, said) = grains("folder", &[&blocks]);
+    assert_eq!(of_folder, named);
+    assert!(said.contains("labelled_mesh.ply is left out"), "{said}");
+    assert_eq!(grains("pattern", &[&blocks.join("b*.[pP][lL][yY]")]).0, named);
+    assert_eq!(grains("list", &[Path::new(&format!("@{}", list.display()))]).0, named);
+    let inspected = gravelometer(["inspect".as_ref(), blocks.as_os_str()]);
+    assert!(inspected.out.contains("survey (2 files)") && inspected.out.contains("is left out"), "{}", inspected.out);
+    gravelometer(["inspect".as_ref(), blocks.as_os_str(), blocks.join("b2.PLY").as_os_str()]).fails(1, &["twice"]);
 }
 
 /// Without a limit every one of the hundreds of tiles looks at the whole survey, so that the grain pass takes

@@ -10,7 +10,7 @@ use gravelometer::curvature::InstructionSet;
 use gravelometer::pipeline::Control;
 use gravelometer::progress::Silent;
 use gravelometer::run::{Job, Outcome, run};
-use gravelometer::settings::{Instructions, Settings};
+use gravelometer::settings::{InputSettings, Instructions, Settings};
 use std::path::{Path, PathBuf};
 use support::bed::{bed, shuffled, write_ply};
 
@@ -189,4 +189,41 @@ fn results_of_the_otira_depend_on_neither_tiles_nor_threads_nor_memory_nor_the_o
     let Some(scene) = otira() else { return };
     let outcome = is_invariant(&scene, [2.5, 0.7]);
     assert_eq!((outcome.catalogue.grains.len(), outcome.catalogue.oversize.len()), (290, 2));
+}
+
+#[test]
+fn how_a_survey_is_placed_on_the_map_changes_its_positions_and_nothing_else() {
+    let scene = Scene { min_grain_area_m2: 1e-3, ..synthetic() };
+    let beside = |name: &str, text: &str| {
+        let path = scene.folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let placed = |name: &str, input: InputSettings| {
+        let mut settings = Settings { input, ..Settings::default() };
+        settings.segment.max_grain_m = scene.max_grain_m;
+        settings.segment.min_grain_area_m2 = scene.min_grain_area_m2;
+        settings.raster.cell_m = 0.5;
+        settings.output.labelled_mesh = true;
+        let (inputs, out) = (vec![scene.mesh.clone()], scene.folder.path().join(name));
+        let job = Job { inputs, out: out.clone(), settings, force: false, resume: false, work: None };
+        assert!(run(&job, &Silent, &Control::default()).unwrap().lost.is_empty());
+        out
+    };
+    let nowhere = placed("nowhere", InputSettings::default());
+    let forms = [
+        ("odm", "WGS84 UTM 33N\n500000 4600000\n0.5 0.5 12\n", [5e5, 46e5, 0.0]),
+        ("pix4d_offset.xyz", "500000.000 4600000.000 100.000\n", [5e5, 46e5, 100.0]),
+        ("shift", "EPSG:32633 500000 4600000 100\n", [5e5, 46e5, 100.0]),
+        ("plain", "-500000\n4600000\n-7\n", [-5e5, 46e5, -7.0]),
+    ];
+    for (name, text, offset) in forms {
+        let input = InputSettings { offset_file: beside(name, text), ..InputSettings::default() };
+        only_moved(&nowhere, &placed(&format!("{name}-out"), input), offset);
+    }
+    beside("bed.prj", "EPSG:2193");
+    only_moved(&nowhere, &placed("prj-out", InputSettings::default()), [0.0; 3]);
+    let report: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(scene.folder.path().join("prj-out/run.json")).unwrap()).unwrap();
+    assert_eq!(report["facts"]["georeference"]["authority"], "EPSG:2193");
 }

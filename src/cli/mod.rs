@@ -26,6 +26,9 @@ Examples:
   A sandbox scan in millimetres, stones of at least 1 cm² visible, with the labelled mesh:
     gravelometer run box.ply -o box --config sandbox --unit mm --min-grain-area 1e-4 --labelled-mesh
 
+  All blocks of a folder, shifted as OpenDroneMap's coords.txt says, which names the CRS as well:
+    gravelometer run blocks -o reach --config drone --offset-file odm_georeferencing/coords.txt
+
 What is written to OUT:
   grains.gpkg        outlines, centres, oversize bodies, tiles, survey (open in QGIS)
   grains.csv         one row for each grain, units in the column names
@@ -71,7 +74,8 @@ pub enum Log {
 /// Arguments of `run`.
 #[derive(Debug, Args)]
 pub struct RunArgs {
-    /// Triangle meshes of one survey (PLY with faces: binary or text)
+    /// Files of one survey: triangle meshes (PLY with faces, binary or text); a folder for all surveys right in it;
+    /// a pattern in quotes, such as "blocks/*.ply"; @LIST for a text file with one path on a line
     #[arg(required = true)]
     pub inputs: Vec<PathBuf>,
     /// Folder for the results; made if missing
@@ -105,13 +109,19 @@ pub struct SettingArgs {
     /// Set any key of the settings file, such as segment.min_sphericity=0.4; may be given again
     #[arg(long, value_name = "SECTION.KEY=VALUE", help_heading = "Settings")]
     pub set: Vec<String>,
-    /// Coordinate reference system: EPSG:n, WKT, or a file that holds WKT [input.crs; default: none]
+    /// Coordinate reference system: EPSG:n, WKT, or a file that holds WKT [input.crs; default: that of the offset file,
+    /// else of a .prj file beside the input, else none]
     #[arg(long, value_name = "CRS", help_heading = "Coordinates")]
     pub crs: Option<String>,
     /// Shift added to the coordinates to reach the CRS, in its units [input.offset; default: 0,0,0]
     #[arg(long, value_name = "E,N[,Z]", allow_hyphen_values = true, value_parser = offset, help_heading = "Coordinates")]
     pub offset: Option<Offset>,
-    /// Unit of the input's coordinates [input.unit; default: that of the CRS, metres without one]
+    /// File that holds the shift, and often the CRS: coords.txt of OpenDroneMap, PROJECT_offset.xyz of Pix4D, SHIFT.txt,
+    /// or two or three plain numbers [input.offset_file; default: none]
+    #[arg(long, value_name = "FILE", help_heading = "Coordinates")]
+    pub offset_file: Option<PathBuf>,
+    /// Unit of the input's coordinates; ft is the international foot, us-ft the US survey foot [input.unit; default:
+    /// that of the CRS, metres without one]
     #[arg(long, value_enum, value_name = "UNIT", help_heading = "Coordinates")]
     pub unit: Option<Unit>,
     /// Widest grain, metres; wider bodies are reported as oversize; 0: no limit [segment.max_grain_m;
@@ -164,6 +174,8 @@ impl SettingArgs {
         let mut set = |key: &str, value: Option<String>| all.extend(value.map(|v| format!("{key}={v}")));
         set("input.crs", self.crs.as_deref().map(word));
         set("input.offset", self.offset.map(|o| format!("{:?}", o.0)));
+        let offset_file = self.offset_file.as_ref().map(|path| path.to_string_lossy());
+        set("input.offset_file", offset_file.as_deref().map(word));
         set("input.unit", self.unit.and_then(|u| u.to_possible_value().map(|v| word(v.get_name()))));
         set("segment.max_grain_m", self.max_grain.map(number));
         set("segment.min_grain_area_m2", self.min_grain_area.map(number));
@@ -178,19 +190,26 @@ impl SettingArgs {
 /// Arguments of `inspect`.
 #[derive(Debug, Args)]
 pub struct InspectArgs {
-    /// Triangle meshes of one survey (PLY with faces: binary or text)
+    /// Files of one survey: triangle meshes (PLY with faces, binary or text); a folder for all surveys right in it;
+    /// a pattern in quotes, such as "blocks/*.ply"; @LIST for a text file with one path on a line
     #[arg(required = true)]
     pub inputs: Vec<PathBuf>,
     /// Print JSON
     #[arg(long)]
     pub json: bool,
-    /// Coordinate reference system: EPSG:n, WKT, or a file that holds WKT
+    /// Coordinate reference system: EPSG:n, WKT, or a file that holds WKT [default: that of the offset file, else of a
+    /// .prj file beside the input, else none]
     #[arg(long, value_name = "CRS")]
     pub crs: Option<String>,
     /// Shift added to the coordinates to reach the CRS, in its units
     #[arg(long, value_name = "E,N[,Z]", allow_hyphen_values = true, value_parser = offset)]
     pub offset: Option<Offset>,
-    /// Unit of the input's coordinates [default: that of the CRS, metres without one]
+    /// File that holds the shift, and often the CRS: coords.txt of OpenDroneMap, PROJECT_offset.xyz of Pix4D, SHIFT.txt,
+    /// or two or three plain numbers
+    #[arg(long, value_name = "FILE")]
+    pub offset_file: Option<PathBuf>,
+    /// Unit of the input's coordinates; ft is the international foot, us-ft the US survey foot [default: that of the
+    /// CRS, metres without one]
     #[arg(long, value_enum, value_name = "UNIT")]
     pub unit: Option<Unit>,
 }

@@ -9,6 +9,9 @@ impl Display for Inspection {
             write_file(f, file)?;
         }
         write_survey(f, &self.survey, self.files.len())?;
+        for note in &self.notes {
+            writeln!(f, "\nnote: {note}")?;
+        }
         for warning in &self.warnings {
             writeln!(f, "\nwarning: {warning}")?;
         }
@@ -35,17 +38,21 @@ fn write_file(f: &mut Formatter<'_>, file: &FileFigures) -> fmt::Result {
 
 fn write_survey(f: &mut Formatter<'_>, survey: &SurveyFigures, files: usize) -> fmt::Result {
     writeln!(f, "survey ({files} {})", if files == 1 { "file" } else { "files" })?;
-    let crs = match (&survey.crs_name, &survey.crs_code) {
+    let place = &survey.georeference;
+    let from = |from: &Option<String>| from.as_ref().map_or_else(String::new, |from| format!(", from {from}"));
+    let crs = match (&place.crs, &place.authority) {
         (Some(name), Some(code)) => format!("{name} ({code})"),
         (Some(name), None) => name.clone(),
         _ => "none".to_owned(),
     };
-    row(f, "CRS", crs)?;
-    row(f, "input unit", format!("{} m", survey.metres_per_input_unit))?;
-    row(f, "map unit", format!("{} m", survey.metres_per_map_unit))?;
-    if survey.offset_map != [0.0; 3] {
-        let [e, n, u] = survey.offset_map;
-        row(f, "offset", format!("{e}, {n}, {u} map units"))?;
+    row(f, "CRS", format!("{crs}{}", from(&place.crs_from)))?;
+    let unit = |name: &str, metres: f64| if metres == 1.0 { name.to_owned() } else { format!("{name}, {metres} m") };
+    let input_unit = unit(&place.input_unit, place.metres_per_input_unit);
+    row(f, "input unit", format!("{input_unit} ({})", place.input_unit_from))?;
+    row(f, "map unit", unit(&place.unit, place.metres_per_map_unit))?;
+    if place.offset_map_units != [0.0; 3] {
+        let [e, n, u] = place.offset_map_units;
+        row(f, "offset", format!("{e}, {n}, {u} map units{}", from(&place.offset_from)))?;
     }
     if files != 1 {
         row(f, "colours", if survey.has_colors { "yes" } else { "none" })?;

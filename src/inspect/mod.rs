@@ -5,7 +5,7 @@ mod needs;
 mod suggestion;
 
 use crate::geometry::{DVec3, ExactSum};
-use crate::open::{Fingerprint, Frame, OpenError, Reach, Scalar, SurveyFile};
+use crate::open::{Fingerprint, Frame, Georeference, OpenError, Reach, Scalar, SurveyFile, resolve_inputs};
 use crate::pipeline::memory_there_bytes;
 use crate::settings::InputSettings;
 use rayon::prelude::*;
@@ -22,6 +22,8 @@ pub struct Inspection {
     pub survey: SurveyFigures,
     /// Each file, in the order given.
     pub files: Vec<FileFigures>,
+    /// What was found beside the files, or left out.
+    pub notes: Vec<String>,
     /// What is odd about them, each with a remedy.
     pub warnings: Vec<String>,
 }
@@ -31,16 +33,8 @@ pub struct Inspection {
 pub struct SurveyFigures {
     /// Counts and coordinates.
     pub contents: Contents,
-    /// Name of the CRS.
-    pub crs_name: Option<String>,
-    /// Code of the CRS, such as `EPSG:2193`.
-    pub crs_code: Option<String>,
-    /// Metres in one unit of the input.
-    pub metres_per_input_unit: f64,
-    /// Metres in one unit of the map.
-    pub metres_per_map_unit: f64,
-    /// Added to reach the map, map units.
-    pub offset_map: [f64; 3],
+    /// CRS, offset and unit, and where they came from.
+    pub georeference: Georeference,
     /// Whether every vertex has a colour.
     pub has_colors: bool,
     /// What the surface is made of.
@@ -114,9 +108,10 @@ pub struct SurfaceFigures {
 /// Opens a survey and looks at every triangle.
 ///
 /// # Errors
-/// Those of [`Reach::open`].
+/// Those of [`resolve_inputs`] and of [`Reach::open`].
 pub fn inspect(paths: &[PathBuf], input: &InputSettings) -> Result<Inspection, OpenError> {
-    let (reach, warnings) = Reach::open(paths, input, &|_, _| {})?;
+    let inputs = resolve_inputs(paths)?;
+    let (reach, warnings) = Reach::open(&inputs.paths, input, &|_, _| {})?;
     let sums: Vec<Sums> = reach.files().iter().map(|f| Sums::of(&reach, f)).collect();
     let frame = reach.frame();
     let files = reach.files().iter().zip(&sums).map(|(f, s)| file_figures(f, s, frame)).collect();
@@ -124,17 +119,14 @@ pub fn inspect(paths: &[PathBuf], input: &InputSettings) -> Result<Inspection, O
     let counts = [reach.vertices(), reach.faces(), reach.triangles()];
     let survey = SurveyFigures {
         contents: Contents::new(counts, reach.input_bounds(), frame),
-        crs_name: frame.crs.as_ref().map(|c| c.name.clone()),
-        crs_code: frame.crs.as_ref().and_then(|c| c.authority.clone()),
-        metres_per_input_unit: frame.metres_per_input_unit,
-        metres_per_map_unit: frame.metres_per_map_unit,
-        offset_map: frame.offset_map,
+        georeference: reach.georeference().clone(),
         has_colors: reach.has_colors(),
         surface,
         suggestion: Suggestion::new(&surface, reach.has_colors()),
         needs: Needs::of(&reach, memory_there_bytes()),
     };
-    Ok(Inspection { survey, files, warnings: warnings.iter().map(ToString::to_string).collect() })
+    let notes = inputs.notes.iter().chain(&reach.georeference().notes).cloned().collect();
+    Ok(Inspection { survey, files, notes, warnings: warnings.iter().map(ToString::to_string).collect() })
 }
 
 fn file_figures(file: &SurveyFile, sums: &Sums, frame: &Frame) -> FileFigures {

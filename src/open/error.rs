@@ -14,6 +14,37 @@ pub enum OpenError {
     /// Two of the paths lead to the same file.
     #[error("{path}: is given twice, so every grain would count twice\nhelp: name each file once")]
     Twice { path: String },
+    /// A folder without surveys.
+    #[error(
+        "{path}: the folder {found}, but no *.ply, *.las or *.laz\nhelp: folders within it are not searched; name the one \
+         that holds the surveys, or the files"
+    )]
+    NoSurveysInFolder { path: String, found: String },
+    /// A folder with a survey in two formats.
+    #[error(
+        "{one} and {other} have one name: if they are the same survey, every grain would count twice\nhelp: name the files that are meant, for instance with a pattern"
+    )]
+    TwoFormats { one: String, other: String },
+    /// A pattern that is none.
+    #[error(
+        "{pattern}: there is no such file, and as a pattern it cannot be understood: {reason}\nhelp: patterns have * for any letters, ? for one, [ab] for one of these"
+    )]
+    Pattern { pattern: String, reason: String },
+    /// A pattern that leads nowhere.
+    #[error(
+        "{pattern}: nothing matches this pattern{but}\nhelp: check it from the working directory; * does not go into folders, and small letters are not capital ones"
+    )]
+    NoMatch { pattern: String, but: &'static str },
+    /// A list of inputs that cannot be read.
+    #[error(
+        "@{path}: the list of inputs cannot be read: {source}\nhelp: name a text file with one path on a line, relative to its own folder"
+    )]
+    InputList { path: String, source: std::io::Error },
+    /// A list of inputs without any.
+    #[error(
+        "@{path}: the list of inputs names no file\nhelp: write one path on a line, relative to the folder of the list"
+    )]
+    InputListEmpty { path: String },
     /// The path is a directory.
     #[error("{path}: is a directory, not a mesh\nhelp: name the files in it, for instance {path}/*.ply")]
     Directory { path: String },
@@ -142,39 +173,71 @@ pub enum OpenError {
     #[error(
         "{path}: coordinates are floating-point numbers as large as {largest}, where they step by {step_m:.3e} m, but the mean \
          edge is only {edge_m:.3e} m long: the surface is destroyed\nhelp: export it again with double coordinates, or \
-         shifted to small ones with the shift given as --offset"
+         shifted to small ones, with the shift given as --offset or --offset-file"
     )]
     FloatStep { path: String, largest: f64, step_m: f64, edge_m: f64 },
+    /// Coordinates with too few digits.
+    #[error(
+        "{path}: coordinates as large as {largest} are printed in steps of {step_m} m, but the mean edge is only {edge_m:.3e} m \
+         long: the surface is destroyed\nhelp: export it again with more digits, or as binary PLY with double \
+         coordinates, or shifted to small ones, with the shift given as --offset or --offset-file"
+    )]
+    PrintedStep { path: String, largest: f64, step_m: f64, edge_m: f64 },
 
     /// A CRS that is neither code, text nor file.
-    #[error("--crs {text}: is neither EPSG:n, nor WKT, nor a file\nhelp: give a code such as EPSG:2193 or a .prj file")]
-    CrsForm { text: String },
+    #[error("{origin}: is neither EPSG:n, nor WKT, nor a file\nhelp: give a code such as EPSG:2193 or a .prj file")]
+    CrsForm { origin: String },
     /// A CRS file that cannot be read.
-    #[error(
-        "--crs {path}: cannot be read: {source}\nhelp: give a code such as EPSG:2193, or a text file that holds WKT"
-    )]
-    CrsFile { path: String, source: std::io::Error },
+    #[error("{origin}: cannot be read: {source}\nhelp: give a code such as EPSG:2193, or a text file that holds WKT")]
+    CrsFile { origin: String, source: std::io::Error },
     /// A CRS that GDAL does not know.
-    #[error("--crs {text}: GDAL cannot make a coordinate system of it: {message}\nhelp: check the code or the WKT")]
-    CrsUnknown { text: String, message: String },
+    #[error(
+        "{origin}: GDAL cannot make a coordinate system of it: {message}\nhelp: check the code or the WKT, or name the \
+         system with --crs"
+    )]
+    CrsUnknown { origin: String, message: String },
     /// A CRS without plane coordinates.
     #[error(
-        "--crs {text}: {name} is {kind}, not a projected system, so lengths cannot be measured in it\nhelp: project the \
-         mesh, for instance to the UTM zone of the site, and name that system"
+        "{origin}: {name} is {kind}, not a projected system, so lengths cannot be measured in it\nhelp: project the \
+         mesh, for instance to the UTM zone of the site, and name that system with --crs"
     )]
-    CrsKind { text: String, name: String, kind: &'static str },
+    CrsKind { origin: String, name: String, kind: &'static str },
     /// A compound CRS of two units.
     #[error(
-        "--crs {text}: {name} measures plan in units of {plan_m} m and height in units of {height_m} m\nhelp: bring \
-         heights and plan to one unit and name a system that uses it"
+        "{origin}: {name} measures plan in units of {plan_m} m and height in units of {height_m} m\nhelp: bring \
+         heights and plan to one unit and name a system that uses it with --crs"
     )]
-    CrsUnits { text: String, name: String, plan_m: f64, height_m: f64 },
+    CrsUnits { origin: String, name: String, plan_m: f64, height_m: f64 },
     /// PROJ is not installed properly.
     #[error(
-        "--crs {text}: PROJ does not find its database: {message}\nhelp: set PROJ_DATA (PROJ 9.1 and newer) or PROJ_LIB \
+        "{origin}: PROJ does not find its database: {message}\nhelp: set PROJ_DATA (PROJ 9.1 and newer) or PROJ_LIB \
          to the directory that holds proj.db, often /usr/share/proj"
     )]
-    ProjDatabase { text: String, message: String },
+    ProjDatabase { origin: String, message: String },
+    /// Two sources name two systems.
+    #[error("{first} says {first_name}, but {second} says {second_name}\nhelp: {help}")]
+    CrsContradiction { first: String, first_name: String, second: String, second_name: String, help: &'static str },
+    /// An offset file that is none.
+    #[error(
+        "{path}: line {line}: {found}, where this is expected: {expected}\nhelp: an offset file holds, for instance,\n{example}"
+    )]
+    OffsetFile { path: String, line: usize, found: String, expected: String, example: String },
+    /// An offset file that cannot be read.
+    #[error("--offset-file {path}: cannot be read: {source}\nhelp: check the path and the file's permissions")]
+    OffsetFileUnreadable { path: String, source: std::io::Error },
+    /// Two offsets.
+    #[error(
+        "input.offset {offset:?} and input.offset_file {path}: only one of them can say how the coordinates reach the \
+         CRS\nhelp: leave out --offset or --offset-file"
+    )]
+    TwoOffsets { offset: [f64; 3], path: String },
+    /// Coordinates in degrees.
+    #[error(
+        "{path}: the coordinates look like degrees: the survey spans {x_extent} x {y_extent} in plan and {z_extent} in height, \
+         and its edges rise {steepness:.0} times as far as they reach in plan\nhelp: project the mesh, for instance to \
+         the UTM zone of the site, and export it again; if the coordinates are metres, say so with --unit m"
+    )]
+    LooksLikeDegrees { path: String, x_extent: f64, y_extent: f64, z_extent: f64, steepness: f64 },
 }
 
 impl OpenError {
@@ -187,6 +250,10 @@ impl OpenError {
                 | OpenError::CrsUnknown { .. }
                 | OpenError::CrsKind { .. }
                 | OpenError::CrsUnits { .. }
+                | OpenError::CrsContradiction { .. }
+                | OpenError::OffsetFile { .. }
+                | OpenError::OffsetFileUnreadable { .. }
+                | OpenError::TwoOffsets { .. }
         )
     }
 }

@@ -40,6 +40,11 @@ const POSITION_STEPS: f64 = 1e6;
 /// exact in `f64` out to 2^33 units, and a valid outline stays valid wherever the offset puts it.
 const OUTLINE_STEPS: f64 = 1_048_576.0;
 
+/// A shorter offset is none to a map.
+const FAR_UNITS: f64 = 10_000.0;
+/// Coordinates that differ from the offset by less than this share of it are of its kind.
+const NEAR_SHARE: f64 = 0.2;
+
 impl Frame {
     /// A frame of plain metres with its origin at zero.
     pub fn metres() -> Frame {
@@ -74,6 +79,17 @@ impl Frame {
             let part = (local[i] / self.metres_per_map_unit * POSITION_STEPS).round() as i64;
             let base = (origin[i] * POSITION_STEPS).round() as i64;
             (part + base) as f64 / POSITION_STEPS
+        })
+    }
+
+    /// Whether a survey with these bounds, input units, is where the offset leads already, so that the offset would
+    /// be added to map coordinates.
+    pub(super) fn is_shifted_twice(&self, bounds: ([f64; 3], [f64; 3])) -> bool {
+        let scale = self.metres_per_input_unit / self.metres_per_map_unit;
+        (0..2).all(|i| {
+            let middle = (bounds.0[i] + bounds.1[i]) / 2.0 * scale;
+            let offset = self.offset_map[i];
+            offset.abs() > FAR_UNITS && (middle - offset).abs() < NEAR_SHARE * offset.abs()
         })
     }
 

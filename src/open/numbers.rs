@@ -1,5 +1,6 @@
 //! Numbers one behind the other, in each of the encodings of PLY.
 
+use super::printed::decimals;
 use super::scalar::Scalar;
 use super::transcode::{Flaw, Value};
 
@@ -96,9 +97,9 @@ impl Numbers for Text<'_> {
         let word = self.word()?;
         let text = std::str::from_utf8(word).ok().filter(|text| text.len() <= LONGEST_WORD);
         let found = text.and_then(|text| match scalar {
-            // The file says how precise a number is; its digits may not say more.
+            // Its type says how precise a number is. Coordinates are not asked for as floats.
             Scalar::F32 => text.parse::<f32>().ok().map(|x| Value::Real(f64::from(x))),
-            Scalar::F64 => text.parse().ok().map(Value::Real),
+            Scalar::F64 => text.parse().ok().map(|real| Value::Printed { real, decimals: decimals(text) }),
             _ => whole(text).filter(|&n| fits(scalar, n)).map(Value::Whole),
         });
         found.ok_or_else(|| {
@@ -164,6 +165,10 @@ mod tests {
         big.extend(5_250_000.1f64.to_be_bytes());
         assert_eq!(all(&mut LittleEndian::new(&little), &types), expected);
         assert_eq!(all(&mut BigEndian::new(&big), &types), expected);
+        let expected = expected.map(|v| match v {
+            Value::Real(real) if real > 1e6 => Value::Printed { real, decimals: 1 },
+            other => other,
+        });
         assert_eq!(all(&mut Text::new(b" -2 65000\r\n-7.0\t0.1\n5250000.1\n"), &types), expected);
     }
 

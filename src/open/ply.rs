@@ -4,6 +4,7 @@ use super::error::OpenError;
 use super::faces::Faces;
 use super::mapped::MappedFile;
 use super::ply_header::PlyHeader;
+use super::printed::PrintedDigits;
 use super::progress::Progress;
 use super::records::{Source, locate};
 use super::survey_file::Fingerprint;
@@ -28,6 +29,8 @@ pub(super) struct PlyMesh {
     pub(super) bounds: ([f64; 3], [f64; 3]),
     /// Bytes behind the last element.
     pub(super) trailing_bytes: u64,
+    /// How finely a text prints the coordinates.
+    pub(super) printed: Option<PrintedDigits>,
 }
 
 impl PlyMesh {
@@ -44,10 +47,10 @@ impl PlyMesh {
         }
         let encoding = header.encoding;
         let source = Source { path, bytes: &bytes };
-        let Transcoded { bytes, header, trailing_bytes } = transcode(source, &header, progress)?;
+        let Transcoded { bytes, header, trailing_bytes, printed } = transcode(source, &header, progress)?;
         check_has_vertices(path, &header)?;
         let mesh = PlyMesh::records(path, (bytes, fingerprint), header, progress)?;
-        Ok(PlyMesh { encoding, trailing_bytes, ..mesh })
+        Ok(PlyMesh { encoding, trailing_bytes, printed, ..mesh })
     }
 
     /// Finds and validates records of little-endian numbers.
@@ -80,7 +83,7 @@ impl PlyMesh {
         let bounds = vertices.validate(source, progress)?;
         let trailing_bytes = bytes.len() as u64 - at;
         let encoding = header.encoding;
-        Ok(PlyMesh { bytes, fingerprint, encoding, header, vertices, faces, bounds, trailing_bytes })
+        Ok(PlyMesh { bytes, fingerprint, encoding, header, vertices, faces, bounds, trailing_bytes, printed: None })
     }
 
     /// The file's bytes.

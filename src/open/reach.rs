@@ -1,12 +1,13 @@
 //! A survey: one or several files in one frame.
 
-use super::crs::GeoReference;
 use super::error::OpenError;
 use super::frame::Frame;
+use super::georeference::{Georeference, SideFiles};
 use super::mapped::MappedFile;
 use super::ply::PlyMesh;
-use super::precision::{COARSEST_STEP_IN_EDGES, coarsest_step};
+use super::precision::{check_not_degrees, check_precision};
 use super::progress::Progress;
+use super::sample::EdgeSample;
 use super::scalar::Scalar;
 use super::survey_file::SurveyFile;
 use super::warning::Warning;
@@ -23,6 +24,7 @@ use std::path::PathBuf;
 #[derive(Debug)]
 pub struct Reach {
     files: Vec<SurveyFile>,
+    georeference: Georeference,
     frame: Frame,
     bounds: ([f64; 3], [f64; 3]),
     full_color: Option<f64>,
@@ -30,10 +32,6 @@ pub struct Reach {
 
 /// Longest survey along an axis, metres. Keeps squares and sums of areas far from the limits of their types.
 const LONGEST_EXTENT_M: f64 = 1e5;
-/// Places in a file, evenly spread, where edges are measured to judge unit and precision.
-const SAMPLED_PLACES: u64 = 256;
-/// Triangles that are measured at each.
-const SAMPLED_TRIANGLES: u64 = 200;
 /// A mean edge above the first, over an extent in plan above the second, is rather one of millimetres: too
 /// coarse to show gravel, metres. The finer pair is that of a box of sand scanned at 0.1 mm.
 const LIKE_MILLIMETRES_M: [(f64, f64); 2] = [(0.2, 50.0), (0.05, 200.0)];
@@ -54,19 +52,27 @@ impl Reach {
         input: &InputSettings,
         progress: &(dyn Fn(u64, u64) + Sync),
     ) -> Result<(Reach, Vec<Warning>), OpenError> {
-        let reference = GeoReference::from_setting(&input.crs)?;
+        // Before the files: what is wrong with a side file is told at once.
+        let georeference = SideFiles::read(paths, input)?.resolve(&[])?;
         let files = open_files(paths, progress)?;
         check_same_kind(&files)?;
         let bounds = joint_bounds(&files);
-        let frame = make_frame(input, reference, &bounds);
+        let frame = georeference.frame(bounds.0);
         check_extent(&files, &frame, &bounds)?;
         let bytes = files.iter().all(|f| f.color_type() == Some(Scalar::U8));
         let has_colors = files.iter().all(|f| f.color_type().is_some());
         let full_color = has_colors.then_some(if bytes { 255.0 } else { 1.0 });
-        let reach = Reach { files, frame, bounds, full_color };
-        let edges_m: Vec<_> = reach.files.iter().map(|file| reach.sampled_edge_m(file)).collect();
-        reach.check_precision(&edges_m)?;
-        let warnings = reach.warnings(input, &edges_m);
+        let reach = Reach { files, georeference, frame, bounds, full_color };
+        let samples: Vec<_> = reach.files.iter().map(|file| EdgeSample::of(file, &reach.frame)).collect();
+        let mut coarse = Vec::new();
+        for (file, sample) in reach.files.iter().zip(&samples) {
+            if input.unit == Unit::Auto {
+                check_not_degrees(&file.path.display().to_string(), sample, file.input_bounds())?;
+            }
+            coarse.extend(check_precision(file, sample, &reach.frame)?);
+        }
+        let mut warnings = reach.warnings(input, samples[0].mean_edge_m());
+        warnings.extend(coarse);
         Ok((reach, warnings))
     }
 
@@ -78,6 +84,11 @@ impl Reach {
     /// From input to local to map.
     pub fn frame(&self) -> &Frame {
         &self.frame
+    }
+
+    /// Where the survey is, and who said so.
+    pub fn georeference(&self) -> &Georeference {
+        &self.georeference
     }
 
     /// The files, in the order given.
@@ -235,55 +246,25 @@ impl Reach {
         }
     }
 
-    /// Mean edge of a sample of a file's triangles, metres, edges of no length left out; `None` if all are.
-    fn sampled_edge_m(&self, file: &SurveyFile) -> Option<f64> {
-        let (mut sum, mut edges) = (0.0, 0u32);
-        for place in 0..SAMPLED_PLACES {
-            let part = |i: u64| (u128::from(i) * u128::from(file.triangles()) / u128::from(SAMPLED_PLACES)) as u64;
-            let triangles = part(place)..part(place + 1).min(part(place) + SAMPLED_TRIANGLES);
-            for triangle in triangles {
-                let [a, b, c] = self.triangle(file.first_triangle + triangle).map(|v| self.position(v));
-                for length in [a.distance(b), b.distance(c), c.distance(a)] {
-                    if length > 0.0 {
-                        sum += length;
-                        edges += 1;
-                    }
-                }
-            }
-            // Corners may lie anywhere in the file, and every page that is touched brings its neighbours.
-            file.mesh.release_if_large();
-        }
-        file.mesh.release();
-        (edges > 0).then(|| sum / f64::from(edges))
-    }
-
-    fn check_precision(&self, edges_m: &[Option<f64>]) -> Result<(), OpenError> {
-        for (file, &edge_m) in self.files.iter().zip(edges_m) {
-            let step = coarsest_step(file.axis_types(), file.input_bounds());
-            if let (Some((step, largest)), Some(edge_m)) = (step, edge_m) {
-                let step_m = step * self.frame.metres_per_input_unit;
-                if step_m > COARSEST_STEP_IN_EDGES * edge_m {
-                    let path = file.path.display().to_string();
-                    return Err(OpenError::FloatStep { path, largest, step_m, edge_m });
-                }
-            }
-        }
-        Ok(())
-    }
-
-    fn warnings(&self, input: &InputSettings, edges_m: &[Option<f64>]) -> Vec<Warning> {
+    fn warnings(&self, input: &InputSettings, mean_edge_m: Option<f64>) -> Vec<Warning> {
         let mut warnings = Vec::new();
         let name = |file: &SurveyFile| file.path.display().to_string();
         if let [first, _, ..] = self.files.as_slice() {
             warnings.push(Warning::SeparateFiles { path: name(first), files: self.files.len() });
         }
-        if let (Some(first), Some(&Some(mean_edge_m))) = (self.files.first(), edges_m.first())
+        if let (Some(first), Some(mean_edge_m)) = (self.files.first(), mean_edge_m)
             && input.unit == Unit::Auto
         {
             let extent_m = self.plan_extent_m();
             if LIKE_MILLIMETRES_M.iter().any(|&(edge, extent)| mean_edge_m >= edge && extent_m > extent) {
                 warnings.push(Warning::LooksLikeMillimetres { path: name(first), mean_edge_m, extent_m });
             }
+        }
+        let Georeference { offset_map_units: offset, .. } = self.georeference;
+        if let Some(first) = self.files.first()
+            && self.frame.is_shifted_twice(self.bounds)
+        {
+            warnings.push(Warning::LooksShifted { path: name(first), lowest: self.bounds.0, offset });
         }
         for file in &self.files {
             let bytes = file.mesh.trailing_bytes;
@@ -351,23 +332,6 @@ fn joint_bounds(files: &[SurveyFile]) -> ([f64; 3], [f64; 3]) {
     files.iter().map(SurveyFile::input_bounds).fold(([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]), |a, b| {
         (std::array::from_fn(|i| a.0[i].min(b.0[i])), std::array::from_fn(|i| a.1[i].max(b.1[i])))
     })
-}
-
-fn make_frame(input: &InputSettings, reference: Option<GeoReference>, bounds: &([f64; 3], [f64; 3])) -> Frame {
-    let metres_per_map_unit = reference.as_ref().map_or(1.0, |r| r.metres_per_unit);
-    let metres_per_input_unit = match input.unit {
-        Unit::Auto => metres_per_map_unit,
-        Unit::M => 1.0,
-        Unit::Mm => 1e-3,
-        Unit::Ft => 0.3048,
-    };
-    Frame {
-        origin_input: bounds.0.map(f64::floor),
-        metres_per_input_unit,
-        offset_map: input.offset,
-        metres_per_map_unit,
-        crs: reference.map(|r| r.crs),
-    }
 }
 
 fn check_extent(files: &[SurveyFile], frame: &Frame, bounds: &([f64; 3], [f64; 3])) -> Result<(), OpenError> {

@@ -1,7 +1,7 @@
 //! One file of a survey, as others see it.
 
 use super::ply::PlyMesh;
-use super::precision::coarsest_step;
+use super::precision::{coarsest_step, printed_step};
 use super::scalar::Scalar;
 use super::vertices::ScalarProperty;
 use serde::Serialize;
@@ -132,7 +132,10 @@ impl SurveyFile {
     /// Coarsest distance between neighbouring values of the file's coordinates at their largest, input
     /// units; `None` if all are whole numbers.
     pub fn coordinate_step(&self) -> Option<f64> {
-        coarsest_step(self.axis_types(), self.input_bounds()).map(|(step, _)| step)
+        let printed = self.mesh.printed.as_ref();
+        let held = coarsest_step(self.axis_types(), self.input_bounds(), printed).map(|(step, _)| step);
+        let printed = printed.and_then(|printed| printed_step(printed, self.input_bounds())).map(|(step, _)| step);
+        held.into_iter().chain(printed).reduce(f64::max)
     }
 
     /// The numbers of a vertex record: those before its first list, if it has lists.

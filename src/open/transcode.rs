@@ -10,10 +10,13 @@ use super::faces::CORNER_NAMES;
 use super::mapped::MappedFile;
 use super::numbers::{BigEndian, LittleEndian, Numbers, Text};
 use super::ply_header::{Element, Kind, PlyHeader, Property};
+use super::printed::PrintedDigits;
 use super::progress::Progress;
 use super::records::{CHUNK, Source};
 use super::scalar::Scalar;
+use super::vertices::AXES;
 use ply_rs_bw::ply::Encoding;
+use std::cell::RefCell;
 use std::io::{BufWriter, Write};
 
 const STRIPS: &str = "tristrips";
@@ -38,6 +41,8 @@ pub(super) struct Transcoded {
     pub(super) header: PlyHeader,
     /// Bytes of the original behind its last element.
     pub(super) trailing_bytes: u64,
+    /// How finely a text prints the coordinates.
+    pub(super) printed: Option<PrintedDigits>,
 }
 
 /// Writes vertices and faces to a scratch file in the system's folder for such files.
@@ -50,7 +55,8 @@ pub(super) fn transcode(
     progress: &Progress<'_>,
 ) -> Result<Transcoded, OpenError> {
     let payload = &source.bytes[header.payload as usize..];
-    let job = Job { source, header, progress };
+    let header = &with_all_digits(header);
+    let job = Job { source, header, progress, printed: RefCell::default() };
     let (scratch, elements, read) = match header.encoding {
         Encoding::Ascii => job.work(Text::new(payload))?,
         Encoding::BinaryBigEndian => job.work(BigEndian::new(payload))?,
@@ -61,8 +67,23 @@ pub(super) fn transcode(
         folder: folder(),
         source: error,
     })?;
+    let printed = (header.encoding == Encoding::Ascii).then(|| job.printed.take());
     let header = PlyHeader { elements, payload: 0, ..header.clone() };
-    Ok(Transcoded { bytes, header, trailing_bytes: (payload.len() - read) as u64 })
+    Ok(Transcoded { bytes, header, trailing_bytes: (payload.len() - read) as u64, printed })
+}
+
+/// The header with double coordinates, if they are text: their digits may say more than their type holds.
+fn with_all_digits(header: &PlyHeader) -> PlyHeader {
+    let mut header = header.clone();
+    let is_text = header.encoding == Encoding::Ascii;
+    for element in header.elements.iter_mut().filter(|e| is_text && e.name == "vertex") {
+        for property in element.properties.iter_mut().filter(|p| AXES.contains(&p.name.as_str())) {
+            if let Kind::Number(scalar @ Scalar::F32) = &mut property.kind {
+                *scalar = Scalar::F64;
+            }
+        }
+    }
+    header
 }
 
 fn folder() -> String {
@@ -73,6 +94,7 @@ struct Job<'a> {
     source: Source<'a>,
     header: &'a PlyHeader,
     progress: &'a Progress<'a>,
+    printed: RefCell<PrintedDigits>,
 }
 
 impl Job<'_> {
@@ -168,7 +190,15 @@ impl Job<'_> {
         let scalar = |p: &Property| if let Kind::Number(scalar) = p.kind { Some(scalar) } else { None };
         let kept: Vec<(usize, Scalar)> =
             element.properties.iter().enumerate().filter_map(|(i, p)| Some((i, scalar(p)?))).collect();
+        let axis = |name: &str| element.properties.iter().position(|p| p.name == name);
+        let axes: Vec<(usize, usize)> =
+            AXES.iter().enumerate().filter_map(|(axis_number, name)| Some((axis_number, axis(name)?))).collect();
         self.each_record(element, numbers, |values, starts| {
+            for &(axis, i) in &axes {
+                if let Some(&Value::Printed { real, decimals }) = values.get(starts[i]) {
+                    self.printed.borrow_mut().see(axis, real, decimals);
+                }
+            }
             kept.iter().try_for_each(|&(i, scalar)| values[starts[i]].write(scalar, to)).map_err(|e| self.unwritten(e))
         })?;
         let properties = kept.iter().map(|&(i, _)| element.properties[i].clone()).collect();
@@ -229,20 +259,25 @@ impl Job<'_> {
 pub(super) enum Value {
     Whole(i64),
     Real(f64),
+    /// With so many decimals.
+    Printed {
+        real: f64,
+        decimals: i32,
+    },
 }
 
 impl Value {
     fn whole(self) -> i64 {
         match self {
             Value::Whole(n) => n,
-            Value::Real(x) => x as i64,
+            Value::Real(x) | Value::Printed { real: x, .. } => x as i64,
         }
     }
 
     fn write(self, scalar: Scalar, to: &mut (impl Write + ?Sized)) -> std::io::Result<()> {
         let real = match self {
             Value::Whole(n) => n as f64,
-            Value::Real(x) => x,
+            Value::Real(x) | Value::Printed { real: x, .. } => x,
         };
         let whole = self.whole().to_le_bytes();
         match scalar {

@@ -11,7 +11,7 @@ use std::ops::Range;
 /// Names under which colours are written.
 const COLOR_NAMES: [[&str; 3]; 3] =
     [["red", "green", "blue"], ["diffuse_red", "diffuse_green", "diffuse_blue"], ["r", "g", "b"]];
-const AXES: [&str; 3] = ["x", "y", "z"];
+pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
 /// The byte of a decoded cloud that is not 0 for points that are to be left out.
 pub(super) const SKIPPED: &str = "gravelometer_skipped";
 

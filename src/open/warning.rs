@@ -36,6 +36,24 @@ pub enum Warning {
         /// What is odd about them.
         reason: String,
     },
+    /// An offset for coordinates that look like map coordinates already.
+    LooksShifted {
+        /// The first file.
+        path: String,
+        /// Lowest coordinates, input units.
+        lowest: [f64; 3],
+        /// The offset, map units.
+        offset: [f64; 3],
+    },
+    /// Text with few digits.
+    CoarselyPrinted {
+        /// The file.
+        path: String,
+        /// Step of the last digit, metres.
+        step_m: f64,
+        /// Mean edge, metres.
+        edge_m: f64,
+    },
     /// Some files have colours and some do not.
     SomeFilesWithoutColours {
         /// The first file without.
@@ -67,6 +85,16 @@ impl fmt::Display for Warning {
                 f,
                 "{path}: colours are ignored: {reason}\nhelp: export colours as uchar (0 to 255), ushort (0 to 65535) \
                  or float (0 to 1)"
+            ),
+            Warning::LooksShifted { path, lowest: [x, y, _], offset: [east, north, _] } => write!(
+                f,
+                "{path}: the coordinates begin at {x}, {y}, and the offset {east}, {north} is added to them: they look \
+                 like map coordinates already\nhelp: leave out the offset, unless the survey was shifted by half"
+            ),
+            Warning::CoarselyPrinted { path, step_m, edge_m } => write!(
+                f,
+                "{path}: coordinates are printed in steps of {step_m} m, and the mean edge is {edge_m:.3e} m long: \
+                 unless they are exact, the surface is roughened\nhelp: export them with more digits, or as binary PLY"
             ),
             Warning::SomeFilesWithoutColours { path } => write!(
                 f,

@@ -3,6 +3,7 @@
 use crate::open::Reach;
 use crate::settings::Settings;
 use serde_json::{Map, Value};
+use twox_hash::XxHash3_64;
 
 /// Names and values of what matters to some part of the work.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -52,12 +53,22 @@ impl Identity {
         self
     }
 
-    /// With everything that any result depends on as well.
-    pub(super) fn and_all(mut self, settings: &Settings) -> Identity {
+    /// With everything that any result depends on as well: of side files what they say, not how they are called.
+    pub(super) fn and_all(mut self, reach: &Reach, settings: &Settings) -> Identity {
         if let Value::Object(sections) = serde_json::json!(settings) {
             // How the work is cut never changes a result.
-            sections.into_iter().filter(|(name, _)| name != "work").for_each(|(name, values)| self.add(&name, values));
+            let others = sections.into_iter().filter(|(name, _)| name != "work" && name != "input");
+            others.for_each(|(name, values)| self.add(&name, values));
         }
+        let frame = reach.frame();
+        self.0.insert("input.unit".into(), frame.metres_per_input_unit.to_string().into());
+        self.0.insert("input.offset".into(), format!("{:?}", frame.offset_map).into());
+        let crs = frame.crs.as_ref().map(|crs| {
+            // All of the WKT counts, but a page of it would hide what else has changed.
+            let wkt = XxHash3_64::oneshot(crs.wkt.as_bytes());
+            format!("{} ({}), WKT {wkt:016x}", crs.name, crs.authority.as_deref().unwrap_or("no code"))
+        });
+        self.0.insert("input.crs".into(), crs.into());
         self
     }
 

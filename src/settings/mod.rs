@@ -44,18 +44,25 @@ pub enum Unit {
     Mm,
     /// International feet (0.3048 m).
     Ft,
+    /// US survey feet (1200/3937 m).
+    #[serde(rename = "us-ft")]
+    #[value(name = "us-ft")]
+    UsFt,
 }
 
 /// What the input's coordinates mean.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
 #[serde(default, deny_unknown_fields)]
 pub struct InputSettings {
-    /// Unit of the input's coordinates: `auto`, `m`, `mm`, `ft`.
+    /// Unit of the input's coordinates: `auto`, `m`, `mm`, `ft`, `us-ft`.
     pub unit: Unit,
     /// Coordinate reference system: `EPSG:n`, WKT, or a file that holds WKT (`.prj`). Empty: none.
     pub crs: String,
     /// East, north and up shift added to the coordinates to reach the CRS, in units of the CRS.
     pub offset: [f64; 3],
+    /// A file that holds this shift, as OpenDroneMap, Pix4D and others write it; it may name the CRS as well.
+    /// Empty: none.
+    pub offset_file: String,
 }
 
 /// How a point cloud gets its surface. Meshes have one.

@@ -32,7 +32,7 @@ use std::io::{BufWriter, Write};
 use umbrella::{Cell, ROUNDS, agreed};
 
 /// Neighbours of a point that are looked at.
-const AROUND: usize = 24;
+const AROUND: usize = 32;
 /// How far they may be, in spacings of the points in plan. Steep planes look no further for others that tell which side
 /// is up.
 const REACH: f64 = 3.5;

@@ -13,23 +13,15 @@ pub(crate) fn write_summary(file: &Pending, summary: &Summary) -> Result<(), Wri
     write(file, summary)
 }
 
-/// What was run: program, version, settings, frame, columns, and the facts that the run hands over.
+/// What was run: program, version, settings, columns, and the facts that the run hands over.
 ///
 /// The costs are those known before this file is written, the last: of the stage `write` all but its end.
 pub(crate) fn write_run(file: &Pending, results: &Results, names: &[&str]) -> Result<(), WriteError> {
-    let frame = results.frame;
     let mut report = json!({
         "program": env!("CARGO_PKG_NAME"),
         "version": env!("CARGO_PKG_VERSION"),
         "settings": results.settings,
         "facts": results.facts,
-        "frame": {
-            "crs": frame.crs.as_ref().map(|c| &c.name),
-            "authority": frame.crs.as_ref().and_then(|c| c.authority.as_ref()),
-            "offset_map_units": frame.offset_map,
-            "metres_per_map_unit": frame.metres_per_map_unit,
-            "metres_per_input_unit": frame.metres_per_input_unit,
-        },
         "outputs": names,
         "grain_columns": COLUMNS,
     });

@@ -101,6 +101,8 @@ fn a_surface_destroyed_by_floats_is_refused() {
     let Some(path) = shared("formats/same_surface/plyfile_utm_FLOAT32_degraded_le.ply") else { return };
     let error = open(&path).expect_err("destroyed");
     assert!(matches!(error, OpenError::FloatStep { .. }), "{error}");
+    let remedy = ["double coordinates", "--offset or --offset-file", "FLOAT32_degraded_le.ply: "];
+    assert_contains(&error.to_string(), &remedy);
 }
 
 #[test]

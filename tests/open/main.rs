@@ -4,9 +4,11 @@ mod files_of_others;
 mod georeference;
 mod layouts;
 mod malformed;
+mod plausible;
 mod ply_bytes;
 mod random_damage;
 mod several_files;
+mod side_files;
 
 use gravelometer::open::{OpenError, Reach, Warning};
 use gravelometer::settings::InputSettings;
