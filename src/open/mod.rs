@@ -1,6 +1,7 @@
 //! Opening a survey: files become arrays in one frame. Knows formats and georeferencing, nothing else.
 
 mod crs;
+mod declared;
 mod error;
 mod faces;
 mod frame;

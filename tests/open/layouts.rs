@@ -250,7 +250,7 @@ fn colours_that_cannot_be_meant_are_ignored_with_a_warning() {
     let add = |kind: &str, value: f64| {
         ["red", "green", "blue"].iter().fold(vertices(), |e, name| e.numbers(&format!("{kind} {name}"), [value; 5]))
     };
-    for (kind, value) in [("float", 200.0), ("float", f64::NAN), ("int", 1.0)] {
+    for (kind, value) in [("float", 200.0), ("float", f64::NAN), ("int", 256.0), ("short", -1.0), ("char", 1.0)] {
         let (reach, warnings) = open_bytes(&file(&[&add(kind, value), &faces()])).expect("readable");
         assert!(!reach.has_colors());
         assert!(matches!(warnings.as_slice(), [Warning::ColoursIgnored { .. }]), "{warnings:?}");
