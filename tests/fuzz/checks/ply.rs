@@ -5,7 +5,7 @@ use gravelometer::settings::InputSettings;
 use std::io::Write;
 
 /// Opens the bytes as a PLY file and reads everything in it.
-pub fn check(bytes: &[u8]) {
+pub(crate) fn check(bytes: &[u8]) {
     let mut file = tempfile::Builder::new().prefix("reach").suffix(".ply").tempfile().expect("a file");
     file.write_all(bytes).expect("room");
     let reach = match Reach::open(&[file.path().to_owned()], &InputSettings::default(), &|_, _| {}) {

@@ -4,7 +4,7 @@ use gravelometer::settings::Settings;
 use std::io::Write;
 
 /// Loads what stands before the first NUL as a settings file, and each line behind it as an assignment.
-pub fn check(bytes: &[u8]) {
+pub(crate) fn check(bytes: &[u8]) {
     let split = bytes.iter().position(|&b| b == 0).unwrap_or(bytes.len());
     let assignments: Vec<String> =
         bytes[split..].split(|&b| b == b'\n' || b == 0).skip(1).map(|l| String::from_utf8_lossy(l).into()).collect();
