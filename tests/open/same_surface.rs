@@ -135,12 +135,21 @@ fn every_file_has_the_same_grains() {
             }
         }
     }
+    // Programs that cut colours to bytes instead of rounding them, as these did, are one step of 255 lower.
+    let cut = grains(&directory, UTM[0]);
+    for (row, of_first) in cut.iter().zip(&first) {
+        for column in ["red_mean", "green_mean", "blue_mean"] {
+            let lower = number(of_first, column) - number(row, column);
+            assert!((0.0..=1.0 / 255.0).contains(&lower), "{column} is {lower} lower");
+        }
+    }
     for name in UTM {
         let found = grains(&directory, name);
         assert_eq!(found.len(), first.len(), "{name}");
-        for (row, of_first) in found.iter().zip(&first) {
+        for ((row, of_first), of_cut) in found.iter().zip(&first).zip(&cut) {
             for (column, text) in row.iter().filter(|(column, _)| !column.starts_with("centroid_")) {
-                assert_eq!(text, &of_first[column], "{name}: {column} of grain {}", row["grain_id"]);
+                let expected = if is_color(column) { of_cut } else { of_first };
+                assert_eq!(text, &expected[column], "{name}: {column} of grain {}", row["grain_id"]);
             }
             for (axis, offset) in ["centroid_x", "centroid_y", "centroid_z"].into_iter().zip(UTM_OFFSET) {
                 let moved = number(row, axis) - number(of_first, axis);
@@ -151,9 +160,11 @@ fn every_file_has_the_same_grains() {
     for name in FLOATS {
         let found = grains(&directory, name);
         assert_eq!(found.len(), first.len(), "{name}");
-        for (row, of_first) in found.iter().zip(&first) {
-            for column in ["grain_id", "triangles", "touches_edge", "red_mean", "green_std"] {
-                assert_eq!(row[column], of_first[column], "{name}: {column}");
+        for ((row, of_first), of_cut) in found.iter().zip(&first).zip(&cut) {
+            for (column, text) in row {
+                if is_color(column) || ["grain_id", "triangles", "touches_edge"].contains(&column.as_str()) {
+                    assert_eq!(text, &of_cut[column], "{name}: {column} of grain {}", row["grain_id"]);
+                }
             }
             for column in ["a_axis_m", "b_axis_m", "c_axis_m", "centroid_x", "centroid_y", "centroid_z"] {
                 let apart = (number(row, column) - number(of_first, column)).abs();
