@@ -14,6 +14,7 @@ use super::progress::Progress;
 use super::records::{CHUNK, Source};
 use super::scalar::Scalar;
 use ply_rs_bw::ply::Encoding;
+use std::cell::Cell;
 use std::io::{BufWriter, Write};
 
 /// Whether a file must be transcoded before its records can be found.
@@ -47,7 +48,7 @@ pub(super) fn transcode(
     progress: &Progress<'_>,
 ) -> Result<Transcoded, OpenError> {
     let payload = &source.bytes[header.payload as usize..];
-    let job = Job { source, header, progress };
+    let job = Job { source, header, progress, told: Cell::new(0) };
     let (scratch, elements, read) = match header.encoding {
         Encoding::Ascii => job.work(Text::new(payload))?,
         Encoding::BinaryBigEndian => job.work(BigEndian::new(payload))?,
@@ -70,6 +71,8 @@ struct Job<'a> {
     source: Source<'a>,
     header: &'a PlyHeader,
     progress: &'a Progress<'a>,
+    /// Bytes of the payload that were told of.
+    told: Cell<usize>,
 }
 
 impl Job<'_> {
@@ -113,15 +116,19 @@ impl Job<'_> {
         if element.properties.is_empty() {
             return Ok(());
         }
-        let mut told = numbers.read();
         for index in 0..element.count {
             take(index, numbers)?;
             if index % CHUNK == CHUNK - 1 {
-                self.source.passed(self.progress, (numbers.read() - told) as u64);
-                told = numbers.read();
+                self.tell(numbers);
             }
         }
         Ok(())
+    }
+
+    /// Says how far the payload is read, and lets go of what was.
+    fn tell(&self, numbers: &impl Numbers) {
+        let read = numbers.read();
+        self.source.passed(self.progress, (read - self.told.replace(read)) as u64);
     }
 
     /// Reads the number of entries of a list, and tells the byte at which it stands.
@@ -238,8 +245,11 @@ impl Job<'_> {
         to: &mut impl Write,
     ) -> Result<u64, OpenError> {
         let (mut triangles, mut before, mut in_strip) = (0, [Value::Whole(0); 2], 0u64);
-        for _ in 0..corners {
+        for i in 0..corners {
             let corner = self.next(at, entry, numbers)?;
+            if i % CHUNK == CHUNK - 1 {
+                self.tell(numbers);
+            }
             if corner.whole() == -1 {
                 in_strip = 0;
                 continue;
