@@ -2,8 +2,9 @@
 //!
 //! Text, big-endian numbers, vertices with lists before their coordinates, and triangle strips have no record that can
 //! be found by counting. They are read once, from front to back, and written as what nearly every mesh is anyway: the
-//! numbers of each vertex, then a list of corners for each face. No list is ever held in memory. The scratch file has no name, so that it goes with
-//! the process whatever happens. Everything behind this sees one kind of file.
+//! numbers of each vertex, then a list of corners for each face. No list is ever held in memory, whatever it says of its
+//! length. The scratch file has no name, so that it goes with the process whatever happens. Everything behind this sees
+//! one kind of file.
 
 use super::error::OpenError;
 use super::faces::{Corners, STRIPS, check_corners, find_corners};
@@ -25,7 +26,8 @@ pub(super) fn is_needed(header: &PlyHeader) -> bool {
     };
     header.encoding != Encoding::BinaryLittleEndian
         || header.element("vertex").is_some_and(number_after_list)
-        || header.element("face").is_none_or(|face| face.count == 0) && header.element(STRIPS).is_some()
+        || header.element("face").is_none_or(|face| face.count == 0)
+            && header.element(STRIPS).is_some_and(|strips| strips.count > 0)
 }
 
 /// What a file became.

@@ -96,14 +96,6 @@ fn coordinates_that_are_no_numbers_name_vertex_and_property() {
 }
 
 #[test]
-fn a_cloud_is_refused_with_what_to_do() {
-    let no_faces = Element::new("face").lists("list uchar int vertex_indices", []);
-    for bytes in [file(&[&vertices(), &no_faces]), file(&[&vertices()])] {
-        assert_contains(&refusal(&bytes), &["5 vertices but no faces", "point cloud", "mesh it"]);
-    }
-}
-
-#[test]
 fn no_vertices_are_refused() {
     let none = Element::new("vertex").numbers("float x", []).numbers("float y", []).numbers("float z", []);
     assert_contains(&refusal(&file(&[&none, &faces()])), &["0 vertices"]);
