@@ -33,3 +33,12 @@ fn every_input_kept_for_ply_is_read_or_refused_by_name() {
 fn every_input_kept_for_settings_is_read_or_refused_by_name() {
     run_all("settings", settings::check);
 }
+
+#[test]
+fn every_target_is_run_here() {
+    let targets = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz/fuzz_targets");
+    let mut names: Vec<_> =
+        targets.read_dir().expect("a folder").map(|entry| entry.expect("an entry").file_name()).collect();
+    names.sort();
+    assert_eq!(names, ["ply.rs", "settings.rs"], "a target without its test above");
+}
