@@ -130,6 +130,12 @@ pub enum OpenError {
          or export it again"
     )]
     Truncated { path: String, bytes: u64, element: String, index: u64, count: u64 },
+    /// The file cannot hold what it declares, which its length alone tells.
+    #[error(
+        "{path}: the file ends at byte {bytes}, at the latest within {element} {index} of {count}\nhelp: the file is cut \
+         off, or many of its faces have fewer than 3 corners; copy or export it again"
+    )]
+    TooShort { path: String, bytes: u64, element: String, index: u64, count: u64 },
     /// A list with a negative length.
     #[error(
         "{path}: {element} {index}: list `{property}` has {length} entries (byte {byte})\nhelp: the data do not match \
@@ -142,6 +148,12 @@ pub enum OpenError {
          instance in MeshLab with Filters > Cleaning and Repairing, or export it again"
     )]
     FewCorners { path: String, face: u64, corners: u64, byte: u64 },
+    /// A face that is no polygon either.
+    #[error(
+        "{path}: face {face} has {corners} corners (byte {byte}); at most {most} are read\nhelp: triangulate the mesh if \
+         this is meant; else the file is damaged or does not match its header: export it again"
+    )]
+    ManyCorners { path: String, face: u64, corners: u64, byte: u64, most: u64 },
     /// A face that names a vertex that is not there.
     #[error(
         "{path}: face {face} refers to vertex {index}, but the file has {vertices} vertices (0 to {last})\nhelp: the \

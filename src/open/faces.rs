@@ -14,6 +14,12 @@ use std::ops::Range;
 /// Names under which the corners of a face, or of a strip of triangles, are written.
 pub(super) const CORNER_NAMES: [&str; 2] = ["vertex_indices", "vertex_index"];
 
+/// The element that holds strips of triangles.
+pub(super) const STRIPS: &str = "tristrips";
+
+/// A polygon of more corners is none, and a list so long is damage: memory must not grow with what a list says.
+pub(super) const MOST_CORNERS: u64 = 1 << 16;
+
 /// The faces of a PLY file. Polygons are fans of triangles about their first corner, in file order.
 #[derive(Debug)]
 pub(super) struct Faces {
@@ -36,10 +42,10 @@ enum Shape {
 
 /// The list of corners within a face record.
 #[derive(Clone, Copy)]
-struct Corners {
-    property: usize,
-    length: Scalar,
-    index: Scalar,
+pub(super) struct Corners {
+    pub(super) property: usize,
+    pub(super) length: Scalar,
+    pub(super) index: Scalar,
 }
 
 enum Flaw {
@@ -145,12 +151,16 @@ fn plain_index(bytes: &[u8]) -> u64 {
     u64::from(u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]))
 }
 
-fn find_corners(path: &str, element: &Element) -> Result<Corners, OpenError> {
+/// The list of corners of a face, or of a strip of triangles.
+///
+/// # Errors
+/// There is none of a known name, or it is no list of whole numbers.
+pub(super) fn find_corners(path: &str, element: &Element) -> Result<Corners, OpenError> {
     let found = CORNER_NAMES.iter().find_map(|name| element.properties.iter().position(|p| p.name == *name));
     let Some(property) = found else {
         return Err(OpenError::PropertyMissing {
             path: path.to_owned(),
-            element: "face",
+            element: if element.name == STRIPS { STRIPS } else { "face" },
             property: CORNER_NAMES[0],
             found: element.property_names(),
         });
@@ -159,7 +169,7 @@ fn find_corners(path: &str, element: &Element) -> Result<Corners, OpenError> {
         Kind::List { length, entry } if entry.is_integer() => Ok(Corners { property, length, index: entry }),
         kind => Err(OpenError::PropertyKind {
             path: path.to_owned(),
-            element: "face".into(),
+            element: element.name.clone(),
             property: element.properties[property].name.clone(),
             kind: kind.to_string(),
             expected: "a list of an integer type",
@@ -245,11 +255,8 @@ fn read_walking(
     for face in 0..element.count {
         let byte = before.end(at, face)?;
         let entries = list.list_length(length, byte, face, property)?;
+        check_corners(source.path, face, entries, byte)?;
         let end = list.end(byte, face)?;
-        if entries < 3 {
-            let path = source.path.to_owned();
-            return Err(OpenError::FewCorners { path, face, corners: entries, byte });
-        }
         for corner in source.bytes[byte as usize + length.size()..end as usize].chunks_exact(index.size()) {
             let index = index.integer(corner);
             if index < 0 || index as u64 >= vertices {
@@ -272,6 +279,17 @@ fn read_walking(
         Shape::Polygons { list_at, first_triangle, face_of }
     };
     Ok((Faces { count: element.count, triangles, length, index, shape }, at))
+}
+
+/// Refuses a list of corners, at this byte, that makes no polygon.
+pub(super) fn check_corners(path: &str, face: u64, corners: u64, byte: u64) -> Result<(), OpenError> {
+    if corners < 3 {
+        return Err(OpenError::FewCorners { path: path.to_owned(), face, corners, byte });
+    }
+    if corners > MOST_CORNERS {
+        return Err(OpenError::ManyCorners { path: path.to_owned(), face, corners, byte, most: MOST_CORNERS });
+    }
+    Ok(())
 }
 
 fn faces_of_triangles(path: &str, first_triangle: &[u64], triangles: u64) -> Result<Vec<u32>, OpenError> {

@@ -2,6 +2,7 @@
 
 mod chunks;
 mod crs;
+mod declared;
 mod draped;
 mod error;
 mod faces;

@@ -8,6 +8,8 @@ use super::transcode::{Flaw, Value};
 pub(super) trait Numbers {
     /// The next number, which has this type.
     fn next(&mut self, scalar: Scalar) -> Result<Value, Flaw>;
+    /// Passes over so many numbers of this type.
+    fn skip(&mut self, scalar: Scalar, numbers: u64) -> Result<(), Flaw>;
     /// Bytes read so far.
     fn read(&self) -> usize;
 }
@@ -29,6 +31,13 @@ impl Numbers for LittleEndian<'_> {
         let bytes = self.payload.get(self.at..self.at + scalar.size()).ok_or(Flaw::End)?;
         self.at += scalar.size();
         Ok(value(scalar, bytes))
+    }
+
+    fn skip(&mut self, scalar: Scalar, numbers: u64) -> Result<(), Flaw> {
+        let room = self.payload.len() - self.at;
+        let bytes = usize::try_from(numbers).ok().and_then(|n| n.checked_mul(scalar.size()));
+        self.at += bytes.filter(|&bytes| bytes <= room).ok_or(Flaw::End)?;
+        Ok(())
     }
 
     fn read(&self) -> usize {
@@ -55,6 +64,10 @@ impl Numbers for BigEndian<'_> {
         turned.copy_from_slice(bytes);
         turned.reverse();
         Ok(value(scalar, turned))
+    }
+
+    fn skip(&mut self, scalar: Scalar, numbers: u64) -> Result<(), Flaw> {
+        self.0.skip(scalar, numbers)
     }
 
     fn read(&self) -> usize {
@@ -84,7 +97,7 @@ impl<'a> Text<'a> {
     fn word(&mut self) -> Result<&'a [u8], Flaw> {
         let rest = &self.payload[self.at..];
         let space = rest.iter().position(|b| !b.is_ascii_whitespace()).ok_or(Flaw::End)?;
-        self.line += rest[..space].iter().filter(|&&b| b == b'\n').count() as u64;
+        self.line += line_ends(&rest[..space]);
         let word = &rest[space..];
         let word = &word[..word.iter().position(u8::is_ascii_whitespace).unwrap_or(word.len())];
         self.at += space + word.len();
@@ -100,6 +113,7 @@ impl Numbers for Text<'_> {
             // Its type says how precise a number is. Coordinates are not asked for as floats.
             Scalar::F32 => text.parse::<f32>().ok().map(|x| Value::Real(f64::from(x))),
             Scalar::F64 => text.parse().ok().map(|real| Value::Printed { real, decimals: decimals(text) }),
+            Scalar::U64 => text.parse::<u64>().ok().map(|n| Value::Whole(n as i64)),
             _ => whole(text).filter(|&n| fits(scalar, n)).map(Value::Whole),
         });
         found.ok_or_else(|| {
@@ -108,11 +122,21 @@ impl Numbers for Text<'_> {
         })
     }
 
+    fn skip(&mut self, scalar: Scalar, numbers: u64) -> Result<(), Flaw> {
+        (0..numbers).try_for_each(|_| self.next(scalar).map(|_| ()))
+    }
+
     fn read(&self) -> usize {
         // The end of the last line is no finding.
         let rest = &self.payload[self.at..];
         self.at + if rest.iter().all(u8::is_ascii_whitespace) { rest.len() } else { 0 }
     }
+}
+
+/// Line feeds, carriage returns, and both together, which count once.
+fn line_ends(space: &[u8]) -> u64 {
+    let ends = |i: usize| space[i] == b'\n' || space[i] == b'\r' && space.get(i + 1) != Some(&b'\n');
+    (0..space.len()).filter(|&i| ends(i)).count() as u64
 }
 
 /// A whole number; some programs write it with a point.
@@ -131,7 +155,8 @@ fn fits(scalar: Scalar, n: i64) -> bool {
         Scalar::U16 => u16::try_from(n).is_ok(),
         Scalar::I32 => i32::try_from(n).is_ok(),
         Scalar::U32 => u32::try_from(n).is_ok(),
-        Scalar::F32 | Scalar::F64 => true,
+        Scalar::U64 => u64::try_from(n).is_ok(),
+        Scalar::I64 | Scalar::F32 | Scalar::F64 => true,
     }
 }
 

@@ -1,11 +1,13 @@
 //! PLY meshes and point clouds.
 
+use super::declared::check_length;
 use super::error::OpenError;
 use super::faces::Faces;
 use super::mapped::MappedFile;
 use super::ply_header::PlyHeader;
 use super::printed::PrintedDigits;
 use super::progress::Progress;
+use super::reach::TOLERATED_TRAILING_BYTES;
 use super::records::{Source, locate};
 use super::survey_file::Fingerprint;
 use super::transcode::{Transcoded, is_needed, transcode};
@@ -41,6 +43,22 @@ impl PlyMesh {
     pub(super) fn open(path: &str, bytes: MappedFile, progress: &Progress<'_>) -> Result<PlyMesh, OpenError> {
         let header = PlyHeader::parse(path, &bytes)?;
         check_has_vertices(path, &header)?;
+        check_length(Source { path, bytes: &bytes }, &header)?;
+        let skipped = header.skipped.first().cloned();
+        let mesh = PlyMesh::of_header(path, bytes, header, progress);
+        match skipped {
+            None => mesh,
+            Some((line, text)) => refuse_misread(mesh, path, line, text),
+        }
+    }
+
+    /// Validates every vertex and face that the header declares.
+    fn of_header(
+        path: &str,
+        bytes: MappedFile,
+        header: PlyHeader,
+        progress: &Progress<'_>,
+    ) -> Result<PlyMesh, OpenError> {
         let fingerprint = Fingerprint::of(&bytes, bytes.modified_s());
         if !is_needed(&header) {
             return PlyMesh::records(path, (bytes, fingerprint), header, progress);
@@ -101,6 +119,21 @@ impl PlyMesh {
     pub(super) fn release_if_large(&self) {
         self.bytes.release_if_large();
     }
+}
+
+/// A header line that is no PLY may only be skipped if the data are whole without it: not a byte more or less.
+fn refuse_misread(mesh: Result<PlyMesh, OpenError>, path: &str, line: u64, text: String) -> Result<PlyMesh, OpenError> {
+    let without = match &mesh {
+        Ok(whole) if whole.trailing_bytes <= TOLERATED_TRAILING_BYTES => return mesh,
+        Ok(longer) => format!("{} bytes are left over", longer.trailing_bytes),
+        Err(error) => {
+            let message = error.to_string();
+            let first = message.lines().next().unwrap_or_default();
+            first.strip_prefix(path).map_or(first, |rest| rest.trim_start_matches(": ")).to_owned()
+        }
+    };
+    let reason = format!("it begins with no PLY keyword, and without it the data do not fit: {without}");
+    Err(OpenError::HeaderLine { path: path.to_owned(), line, text, reason })
 }
 
 /// Whether the header declares vertices at all: told before anything about encodings, which would send people off to

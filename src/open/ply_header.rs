@@ -3,13 +3,18 @@
 //! The grammar is that of `ply-rs-bw`. Lines are cut here, because the byte at which the payload starts
 //! must be known exactly, and names are swapped for plain ones before the grammar sees them, because it
 //! refuses names that CloudCompare writes (`scalar_CANUPO.class`), merges properties of the same name
-//! (which would shift every byte behind them) and stops at comments that are not UTF-8.
+//! (which would shift every byte behind them) and stops at comments that are not UTF-8. Types of 64 bits, which it
+//! does not know, go the same way.
 
 use super::error::OpenError;
 use super::scalar::Scalar;
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{DefaultElement, Encoding, PropertyType, ScalarType};
+use std::collections::HashSet;
 use std::fmt;
+
+/// The words that a header line may begin with, comments aside.
+const KEYWORDS: [&str; 5] = ["ply", "format", "element", "property", "end_header"];
 
 /// Longest header that is looked for, bytes.
 const LONGEST_HEADER: usize = 1 << 20;
@@ -23,6 +28,8 @@ pub(super) struct PlyHeader {
     pub(super) elements: Vec<Element>,
     /// `comment` and `obj_info` texts in file order.
     pub(super) comments: Vec<String>,
+    /// Lines that begin with no word of PLY, as a comment does that lacks its `comment`: number, from 1, and text.
+    pub(super) skipped: Vec<(u64, String)>,
     /// First byte of the payload.
     pub(super) payload: u64,
     /// Lines before it.
@@ -85,18 +92,21 @@ impl PlyHeader {
             let reason = reason.split_once(": ").map_or(reason, |(_, r)| r).trim_end_matches('.').to_owned();
             OpenError::HeaderLine { path: path.to_owned(), line: line as u64, text: shorten(&text), reason }
         })?;
-        let mut names = plain.names.into_iter();
-        let mut name = || names.next().unwrap_or_default();
+        let mut words = plain.words.into_iter();
+        let mut word = || words.next().unwrap_or_default();
         let elements = parsed
             .elements
             .values()
             .map(|e| Element {
-                name: name(),
+                name: word().name,
                 count: e.count as u64,
                 properties: e
                     .properties
                     .values()
-                    .map(|p| Property { name: name(), kind: kind_of(&p.data_type) })
+                    .map(|p| {
+                        let Words { name, wide } = word();
+                        Property { name, kind: kind_of(&p.data_type, wide) }
+                    })
                     .collect(),
             })
             .collect();
@@ -104,6 +114,7 @@ impl PlyHeader {
             encoding: parsed.encoding,
             elements,
             comments: plain.comments,
+            skipped: plain.skipped,
             payload: lines.payload,
             lines: lines.texts.len() as u64,
         };
@@ -112,8 +123,9 @@ impl PlyHeader {
     }
 
     fn check(&self, path: &str) -> Result<(), OpenError> {
-        for (i, element) in self.elements.iter().enumerate() {
-            if self.elements[..i].iter().any(|e| e.name == element.name) {
+        let mut names = HashSet::new();
+        for element in &self.elements {
+            if !names.insert(element.name.as_str()) {
                 return Err(OpenError::RepeatedElement { path: path.to_owned(), element: element.name.clone() });
             }
             for property in &element.properties {
@@ -139,7 +151,17 @@ impl PlyHeader {
     }
 }
 
-fn kind_of(kind: &PropertyType) -> Kind {
+/// The type of 64 bits of this name.
+fn wide(name: &str) -> Option<Scalar> {
+    [Scalar::I64, Scalar::U64].into_iter().find(|s| s.ply_name() == name)
+}
+
+/// A type that the grammar knows in place of one that it does not.
+fn narrow(name: &str) -> &str {
+    if wide(name).is_some() { "int" } else { name }
+}
+
+fn kind_of(kind: &PropertyType, wide: [Option<Scalar>; 2]) -> Kind {
     let scalar = |s: &ScalarType| match s {
         ScalarType::Char => Scalar::I8,
         ScalarType::UChar => Scalar::U8,
@@ -151,8 +173,11 @@ fn kind_of(kind: &PropertyType) -> Kind {
         ScalarType::Double => Scalar::F64,
     };
     match kind {
-        PropertyType::Scalar(s) => Kind::Number(scalar(s)),
-        PropertyType::List(length, entry) => Kind::List { length: scalar(length), entry: scalar(entry) },
+        PropertyType::Scalar(s) => Kind::Number(wide[0].unwrap_or_else(|| scalar(s))),
+        PropertyType::List(length, entry) => Kind::List {
+            length: wide[0].unwrap_or_else(|| scalar(length)),
+            entry: wide[1].unwrap_or_else(|| scalar(entry)),
+        },
     }
 }
 
@@ -172,9 +197,11 @@ impl HeaderLines {
         let (mut texts, mut at, mut old_mac) = (Vec::new(), 0, false);
         while at < head.len() {
             let end = head[at..].iter().position(|&b| b == b'\n' || b == b'\r').map_or(head.len(), |n| at + n);
-            let text = String::from_utf8_lossy(&head[at..end]).trim().to_owned();
+            let mut text = String::from_utf8_lossy(&head[at..end]).trim().to_owned();
             let crlf = head[end..].starts_with(b"\r\n");
             if texts.is_empty() {
+                // Some editors put a byte order mark before text.
+                text = text.trim_start_matches('\u{feff}').to_owned();
                 if text != "ply" {
                     return Err(OpenError::NotPly { path: path.to_owned(), start: shorten(&text) });
                 }
@@ -195,14 +222,23 @@ impl HeaderLines {
 /// The header with plain names, line by line as in the file; what was taken out of it lies beside.
 struct PlainHeader {
     text: String,
-    names: Vec<String>,
+    words: Vec<Words>,
     comments: Vec<String>,
+    skipped: Vec<(u64, String)>,
+}
+
+/// What the grammar is not shown of an element or a property.
+#[derive(Default)]
+struct Words {
+    name: String,
+    wide: [Option<Scalar>; 2],
 }
 
 impl PlainHeader {
     fn new(lines: &[String]) -> PlainHeader {
-        let mut plain = PlainHeader { text: String::new(), names: Vec::new(), comments: Vec::new() };
-        for line in lines {
+        let mut plain =
+            PlainHeader { text: String::new(), words: Vec::new(), comments: Vec::new(), skipped: Vec::new() };
+        for (number, line) in (1..).zip(lines) {
             let words: Vec<&str> = line.split_ascii_whitespace().collect();
             let rewritten = match words.as_slice() {
                 [] => "comment".to_owned(),
@@ -211,12 +247,21 @@ impl PlainHeader {
                     "comment".to_owned()
                 }
                 ["element", name, count] => {
-                    let n = plain.name(name);
+                    let n = plain.take(name, [None; 2]);
                     format!("element n{n} {count}")
                 }
-                ["property", kind @ .., name] if !kind.is_empty() => {
-                    let n = plain.name(name);
-                    format!("property {} n{n}", kind.join(" "))
+                // Behind the types is the name, and some have blanks in it.
+                ["property", "list", length, entry, name @ ..] if !name.is_empty() => {
+                    let n = plain.take(&name.join(" "), [wide(length), wide(entry)]);
+                    format!("property list {} {} n{n}", narrow(length), narrow(entry))
+                }
+                ["property", kind, name @ ..] if !name.is_empty() && *kind != "list" => {
+                    let n = plain.take(&name.join(" "), [wide(kind), None]);
+                    format!("property {} n{n}", narrow(kind))
+                }
+                [word, ..] if !KEYWORDS.contains(word) && !line.contains(|c: char| c.is_control() && c != '\t') => {
+                    plain.skipped.push((number, shorten(line)));
+                    "comment".to_owned()
                 }
                 _ => words.join(" "),
             };
@@ -226,8 +271,8 @@ impl PlainHeader {
         plain
     }
 
-    fn name(&mut self, name: &str) -> usize {
-        self.names.push(name.to_owned());
-        self.names.len()
+    fn take(&mut self, name: &str, wide: [Option<Scalar>; 2]) -> usize {
+        self.words.push(Words { name: name.to_owned(), wide });
+        self.words.len()
     }
 }

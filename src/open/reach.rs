@@ -36,7 +36,7 @@ const LONGEST_EXTENT_M: f64 = 1e5;
 /// coarse to show gravel, metres. The finer pair is that of a box of sand scanned at 0.1 mm.
 const LIKE_MILLIMETRES_M: [(f64, f64); 2] = [(0.2, 50.0), (0.05, 200.0)];
 /// A line feed, or a line feed and a carriage return, behind the last record is no finding.
-const TOLERATED_TRAILING_BYTES: u64 = 2;
+pub(super) const TOLERATED_TRAILING_BYTES: u64 = 2;
 
 impl Reach {
     /// Maps the files, validates every record, finds the bounds and sets the frame. `progress` hears the
@@ -270,6 +270,10 @@ impl Reach {
             let bytes = file.mesh.trailing_bytes;
             if bytes > TOLERATED_TRAILING_BYTES {
                 warnings.push(Warning::TrailingBytes { path: name(file), bytes });
+            }
+            if let Some((line, text)) = file.mesh.header.skipped.first().cloned() {
+                let lines = file.mesh.header.skipped.len() as u64;
+                warnings.push(Warning::HeaderLinesSkipped { path: name(file), line, text, lines });
             }
             if let Some(reason) = &file.mesh.vertices.color_refused {
                 warnings.push(Warning::ColoursIgnored { path: name(file), reason: reason.clone() });

@@ -92,7 +92,8 @@ impl<'a> Walk<'a> {
                 Step::Skip(bytes) => at + bytes,
                 Step::List { property, length, entry_bytes } => {
                     let entries = self.list_length(*length, at, index, *property)?;
-                    at + length.size() as u64 + entries * entry_bytes
+                    // Beyond any file where it saturates.
+                    at.saturating_add(length.size() as u64).saturating_add(entries.saturating_mul(*entry_bytes))
                 }
             };
         }
@@ -105,7 +106,7 @@ impl<'a> Walk<'a> {
     /// Number of entries of the list at byte `at`.
     #[inline]
     pub(super) fn list_length(&self, length: Scalar, at: u64, index: u64, property: usize) -> Result<u64, OpenError> {
-        let Some(bytes) = self.source.bytes.get(at as usize..at as usize + length.size()) else {
+        let Some(bytes) = self.source.bytes.get(at as usize..(at as usize).saturating_add(length.size())) else {
             return Err(self.truncated(index));
         };
         let entries = length.integer(bytes);

@@ -2,11 +2,12 @@
 //!
 //! Text, big-endian numbers, vertices with lists before their coordinates, and triangle strips have no record that can
 //! be found by counting. They are read once, from front to back, and written as what nearly every mesh is anyway: the
-//! numbers of each vertex, then a list of corners for each face. The scratch file has no name, so that it goes with
-//! the process whatever happens. Everything behind this sees one kind of file.
+//! numbers of each vertex, then a list of corners for each face. No list is ever held in memory, whatever it says of its
+//! length. The scratch file has no name, so that it goes with the process whatever happens. Everything behind this sees
+//! one kind of file.
 
 use super::error::OpenError;
-use super::faces::CORNER_NAMES;
+use super::faces::{Corners, STRIPS, check_corners, find_corners};
 use super::mapped::MappedFile;
 use super::numbers::{BigEndian, LittleEndian, Numbers, Text};
 use super::ply_header::{Element, Kind, PlyHeader, Property};
@@ -16,10 +17,8 @@ use super::records::{CHUNK, Source};
 use super::scalar::Scalar;
 use super::vertices::AXES;
 use ply_rs_bw::ply::Encoding;
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::io::{BufWriter, Write};
-
-const STRIPS: &str = "tristrips";
 
 /// Whether a file must be transcoded before its records can be found.
 pub(super) fn is_needed(header: &PlyHeader) -> bool {
@@ -56,7 +55,7 @@ pub(super) fn transcode(
 ) -> Result<Transcoded, OpenError> {
     let payload = &source.bytes[header.payload as usize..];
     let header = &with_all_digits(header);
-    let job = Job { source, header, progress, printed: RefCell::default() };
+    let job = Job { source, header, progress, printed: RefCell::default(), told: Cell::new(0) };
     let (scratch, elements, read) = match header.encoding {
         Encoding::Ascii => job.work(Text::new(payload))?,
         Encoding::BinaryBigEndian => job.work(BigEndian::new(payload))?,
@@ -95,6 +94,8 @@ struct Job<'a> {
     header: &'a PlyHeader,
     progress: &'a Progress<'a>,
     printed: RefCell<PrintedDigits>,
+    /// Bytes of the payload that were told of.
+    told: Cell<usize>,
 }
 
 impl Job<'_> {
@@ -107,10 +108,13 @@ impl Job<'_> {
         for element in &self.header.elements {
             let written = match element.name.as_str() {
                 "vertex" => Some(self.vertices(element, &mut numbers, &mut to)?),
-                "face" if !strips => Some(self.corners(element, &mut numbers, &mut to, Self::face)?),
-                STRIPS if strips => Some(self.corners(element, &mut numbers, &mut to, Self::strip)?),
+                "face" if !strips => Some(self.corners(element, &mut numbers, &mut to)?),
+                STRIPS if strips => Some(self.corners(element, &mut numbers, &mut to)?),
                 _ => {
-                    self.each_record(element, &mut numbers, |_, _| Ok(()))?;
+                    self.each_record(element, &mut numbers, |index, numbers| {
+                        let mut properties = element.properties.iter();
+                        properties.try_for_each(|property| self.skip(Place { element, index, property }, numbers))
+                    })?;
                     None
                 }
             };
@@ -124,54 +128,63 @@ impl Job<'_> {
         OpenError::Scratch { path: self.source.path.to_owned(), folder: folder(), source }
     }
 
-    /// Reads the records of an element one by one. `take` gets all numbers of a record, entries of lists among them, and
-    /// where those of each property start, with the end behind the last.
-    fn each_record(
+    /// Goes through the records of an element; `take` reads one.
+    fn each_record<N: Numbers>(
         &self,
         element: &Element,
-        numbers: &mut impl Numbers,
-        mut take: impl FnMut(&[Value], &[usize]) -> Result<(), OpenError>,
+        numbers: &mut N,
+        mut take: impl FnMut(u64, &mut N) -> Result<(), OpenError>,
     ) -> Result<(), OpenError> {
-        let (mut values, mut starts, mut told) = (Vec::new(), Vec::new(), numbers.read());
+        // Records of nothing take no bytes, however many are declared.
+        if element.properties.is_empty() {
+            return Ok(());
+        }
         for index in 0..element.count {
-            values.clear();
-            starts.clear();
-            for property in &element.properties {
-                let fails = |flaw| self.flaw(element, index, property, flaw);
-                starts.push(values.len());
-                match property.kind {
-                    Kind::Number(scalar) => values.push(numbers.next(scalar).map_err(fails)?),
-                    Kind::List { length, entry } => {
-                        let entries = numbers.next(length).map_err(fails)?;
-                        let entries = entries.whole();
-                        if entries < 0 {
-                            return Err(fails(Flaw::Length(entries)));
-                        }
-                        for _ in 0..entries {
-                            values.push(numbers.next(entry).map_err(fails)?);
-                        }
-                    }
-                }
-            }
-            starts.push(values.len());
-            take(&values, &starts)?;
+            take(index, numbers)?;
             if index % CHUNK == CHUNK - 1 {
-                self.source.passed(self.progress, (numbers.read() - told) as u64);
-                told = numbers.read();
+                self.tell(numbers);
             }
         }
         Ok(())
     }
 
-    fn flaw(&self, element: &Element, index: u64, property: &Property, flaw: Flaw) -> OpenError {
+    /// Says how far the payload is read, and lets go of what was.
+    fn tell(&self, numbers: &impl Numbers) {
+        let read = numbers.read();
+        self.source.passed(self.progress, (read - self.told.replace(read)) as u64);
+    }
+
+    /// Reads the number of entries of a list, and tells the byte at which it stands.
+    fn entries(&self, at: Place<'_>, length: Scalar, numbers: &mut impl Numbers) -> Result<(u64, u64), OpenError> {
+        let byte = self.header.payload + numbers.read() as u64;
+        let entries = self.next(at, length, numbers)?.whole();
+        let entries = u64::try_from(entries).map_err(|_| self.flaw(at, Flaw::Length { entries, byte }))?;
+        Ok((entries, byte))
+    }
+
+    fn next(&self, at: Place<'_>, scalar: Scalar, numbers: &mut impl Numbers) -> Result<Value, OpenError> {
+        numbers.next(scalar).map_err(|flaw| self.flaw(at, flaw))
+    }
+
+    /// Passes over what is not needed.
+    fn skip(&self, at: Place<'_>, numbers: &mut impl Numbers) -> Result<(), OpenError> {
+        let (scalar, count) = match at.property.kind {
+            Kind::Number(scalar) => (scalar, 1),
+            Kind::List { length, entry } => (entry, self.entries(at, length, numbers)?.0),
+        };
+        numbers.skip(scalar, count).map_err(|flaw| self.flaw(at, flaw))
+    }
+
+    fn flaw(&self, at: Place<'_>, flaw: Flaw) -> OpenError {
+        let Place { element, index, property } = at;
         let (path, name, property) = (self.source.path.to_owned(), element.name.clone(), property.name.clone());
         match flaw {
             Flaw::End => {
                 let bytes = self.source.bytes.len() as u64;
                 OpenError::Truncated { path, bytes, element: name, index, count: element.count }
             }
-            Flaw::Length(length) => {
-                OpenError::ListLength { path, element: name, index, property, length, byte: self.header.payload }
+            Flaw::Length { entries, byte } => {
+                OpenError::ListLength { path, element: name, index, property, length: entries, byte }
             }
             Flaw::Text { line, text } => {
                 let line = line + self.header.lines;
@@ -187,71 +200,111 @@ impl Job<'_> {
         numbers: &mut impl Numbers,
         to: &mut impl Write,
     ) -> Result<Element, OpenError> {
-        let scalar = |p: &Property| if let Kind::Number(scalar) = p.kind { Some(scalar) } else { None };
-        let kept: Vec<(usize, Scalar)> =
-            element.properties.iter().enumerate().filter_map(|(i, p)| Some((i, scalar(p)?))).collect();
-        let axis = |name: &str| element.properties.iter().position(|p| p.name == name);
-        let axes: Vec<(usize, usize)> =
-            AXES.iter().enumerate().filter_map(|(axis_number, name)| Some((axis_number, axis(name)?))).collect();
-        self.each_record(element, numbers, |values, starts| {
-            for &(axis, i) in &axes {
-                if let Some(&Value::Printed { real, decimals }) = values.get(starts[i]) {
-                    self.printed.borrow_mut().see(axis, real, decimals);
+        let axis_of = |property: &Property| AXES.iter().position(|name| property.name == *name);
+        self.each_record(element, numbers, |index, numbers| {
+            element.properties.iter().try_for_each(|property| {
+                let at = Place { element, index, property };
+                let Kind::Number(scalar) = property.kind else { return self.skip(at, numbers) };
+                let value = self.next(at, scalar, numbers)?;
+                if let (Value::Printed { real, decimals }, Some(axis)) = (&value, axis_of(property)) {
+                    self.printed.borrow_mut().see(axis, *real, *decimals);
                 }
-            }
-            kept.iter().try_for_each(|&(i, scalar)| values[starts[i]].write(scalar, to)).map_err(|e| self.unwritten(e))
+                value.write(scalar, to).map_err(|e| self.unwritten(e))
+            })
         })?;
-        let properties = kept.iter().map(|&(i, _)| element.properties[i].clone()).collect();
+        let is_number = |p: &&Property| matches!(p.kind, Kind::Number(_));
+        let properties = element.properties.iter().filter(is_number).cloned().collect();
         Ok(Element { name: element.name.clone(), count: element.count, properties })
     }
 
-    /// The list of corners of each face; everything else is left out.
+    /// The corners of each face, or of each triangle of each strip; everything else is left out.
     fn corners(
         &self,
         element: &Element,
         numbers: &mut impl Numbers,
         to: &mut impl Write,
-        put: impl Fn(&[Value], Scalar, &mut dyn Write) -> std::io::Result<u64>,
     ) -> Result<Element, OpenError> {
-        let found = CORNER_NAMES.iter().find_map(|name| element.properties.iter().position(|p| p.name == *name));
-        let place =
-            found.filter(|&i| matches!(element.properties[i].kind, Kind::List { entry, .. } if entry.is_integer()));
+        let Corners { property: place, length, index: entry } = find_corners(self.source.path, element)?;
         let mut faces = 0;
-        let mut kind = Kind::List { length: Scalar::U32, entry: Scalar::I32 };
-        self.each_record(element, numbers, |values, starts| {
-            let Some(i) = place else { return Ok(()) };
-            let Kind::List { entry, .. } = element.properties[i].kind else { return Ok(()) };
-            kind = Kind::List { length: Scalar::U32, entry };
-            faces += put(&values[starts[i]..starts[i + 1]], entry, to).map_err(|e| self.unwritten(e))?;
+        self.each_record(element, numbers, |index, numbers| {
+            for (i, property) in element.properties.iter().enumerate() {
+                let at = Place { element, index, property };
+                if i != place {
+                    self.skip(at, numbers)?;
+                    continue;
+                }
+                let (corners, byte) = self.entries(at, length, numbers)?;
+                faces += if element.name == STRIPS {
+                    self.strips(at, (corners, entry), numbers, to)?
+                } else {
+                    check_corners(self.source.path, index, corners, byte)?;
+                    self.face(at, (corners, entry), numbers, to)?
+                };
+            }
             Ok(())
         })?;
-        // A face without a usable list of corners is refused by its names, as in any other file.
-        let properties = match place {
-            Some(i) => vec![Property { name: element.properties[i].name.clone(), kind }],
-            None => element.properties.clone(),
-        };
-        Ok(Element { name: "face".to_owned(), count: if place.is_some() { faces } else { element.count }, properties })
+        let name = element.properties[place].name.clone();
+        let kind = Kind::List { length: Scalar::U32, entry };
+        Ok(Element { name: "face".to_owned(), count: faces, properties: vec![Property { name, kind }] })
     }
 
-    fn face(corners: &[Value], entry: Scalar, to: &mut dyn Write) -> std::io::Result<u64> {
-        to.write_all(&(corners.len() as u32).to_le_bytes())?;
-        corners.iter().try_for_each(|corner| corner.write(entry, to)).map(|()| 1)
+    fn face(
+        &self,
+        at: Place<'_>,
+        (corners, entry): (u64, Scalar),
+        numbers: &mut impl Numbers,
+        to: &mut impl Write,
+    ) -> Result<u64, OpenError> {
+        to.write_all(&(corners as u32).to_le_bytes()).map_err(|e| self.unwritten(e))?;
+        for _ in 0..corners {
+            self.next(at, entry, numbers)?.write(entry, to).map_err(|e| self.unwritten(e))?;
+        }
+        Ok(1)
     }
 
     /// Every corner but the first two of a strip makes a triangle with the two before it, turned over every other time;
-    /// -1 begins a new strip. Triangles that name a vertex twice only lead on.
-    fn strip(corners: &[Value], entry: Scalar, to: &mut dyn Write) -> std::io::Result<u64> {
-        let mut triangles = 0;
-        for strip in corners.split(|corner| corner.whole() == -1) {
-            for (i, three) in strip.windows(3).enumerate() {
-                let [a, b, c] = [three[i % 2], three[1 - i % 2], three[2]];
+    /// -1 begins a new strip. Triangles that name a vertex twice only lead on. All strips may be one list, so no more
+    /// of it is held than two corners.
+    fn strips(
+        &self,
+        at: Place<'_>,
+        (corners, entry): (u64, Scalar),
+        numbers: &mut impl Numbers,
+        to: &mut impl Write,
+    ) -> Result<u64, OpenError> {
+        let (mut triangles, mut before, mut in_strip) = (0, [Value::Whole(0); 2], 0u64);
+        for i in 0..corners {
+            let corner = self.next(at, entry, numbers)?;
+            if i % CHUNK == CHUNK - 1 {
+                self.tell(numbers);
+            }
+            if corner.whole() == -1 {
+                in_strip = 0;
+                continue;
+            }
+            if in_strip >= 2 {
+                let turned = (in_strip % 2) as usize;
+                let [a, b, c] = [before[turned], before[1 - turned], corner];
                 if a.whole() != b.whole() && b.whole() != c.whole() && c.whole() != a.whole() {
-                    triangles += Self::face(&[a, b, c], entry, to)?;
+                    let triangle = to.write_all(&3u32.to_le_bytes());
+                    let triangle = triangle.and_then(|()| [a, b, c].iter().try_for_each(|v| v.write(entry, to)));
+                    triangle.map_err(|e| self.unwritten(e))?;
+                    triangles += 1;
                 }
             }
+            before = [before[1], corner];
+            in_strip += 1;
         }
         Ok(triangles)
     }
+}
+
+/// Where something stands, for messages.
+#[derive(Clone, Copy)]
+struct Place<'a> {
+    element: &'a Element,
+    index: u64,
+    property: &'a Property,
 }
 
 /// A number of any type.
@@ -294,7 +347,7 @@ pub(super) enum Flaw {
     /// The file ends before it.
     End,
     /// A list cannot be so long.
-    Length(i64),
+    Length { entries: i64, byte: u64 },
     /// Something else stands there, on this line of the payload.
     Text { line: u64, text: String },
 }

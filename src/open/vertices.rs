@@ -43,6 +43,8 @@ struct Color {
     scalar: Scalar,
     offsets: [usize; 3],
     full: f64,
+    /// Whether the type holds more than 0 to `full`, so that every value must be looked at.
+    is_wider: bool,
 }
 
 /// The vertices of a PLY file.
@@ -69,7 +71,7 @@ pub(super) struct VertexBounds {
     pub(super) max: [f64; 3],
     /// The lowest vertex with a coordinate that is no number, and the axis.
     not_finite: Option<(u64, usize)>,
-    /// The lowest vertex with a float colour outside 0 to 1.
+    /// The lowest vertex with a colour outside 0 to full.
     odd_color: Option<u64>,
 }
 
@@ -153,16 +155,17 @@ impl Vertices {
             let value = self.position(source.bytes, vertex)[axis];
             return Err(OpenError::NotFinite { path: source.path.to_owned(), vertex, property: AXES[axis], value });
         }
-        if let Some(vertex) = bounds.odd_color {
+        if let (Some(vertex), Some(color)) = (bounds.odd_color, self.color) {
             self.color = None;
-            self.color_refused = Some(format!("vertex {vertex} has a float colour outside 0 to 1"));
+            let (kind, full) = (color.scalar.ply_name(), color.full);
+            self.color_refused = Some(format!("vertex {vertex} has a {kind} colour outside 0 to {full}"));
         }
         Ok((bounds.min, bounds.max))
     }
 
     /// Bounds of vertices of which nothing else need be told; none if something must.
     fn plain_bounds(&self, bytes: &[u8], vertices: Range<u64>) -> Option<VertexBounds> {
-        if self.color.is_some_and(|c| !c.scalar.is_integer()) {
+        if self.color.is_some_and(|c| c.is_wider) {
             return None;
         }
         let (mut bounds, mut finite) = (VertexBounds::EMPTY, true);
@@ -187,7 +190,7 @@ impl Vertices {
             }
         }
         if let Some(color) = self.color
-            && !color.scalar.is_integer()
+            && color.is_wider
             && bounds.odd_color.is_none()
             && !self.color(bytes, vertex).is_some_and(|c| c.iter().all(|v| (0.0..=1.0).contains(v)))
         {
@@ -312,14 +315,16 @@ fn find_color(element: &Element, scalars: &[ScalarProperty]) -> (Option<Color>, 
     let &[red, green, blue] = found.as_slice() else {
         return (None, Some(format!("`{}` is a list or follows one", names.join("`, `"))));
     };
-    let full = match red.scalar {
-        Scalar::U8 => 255.0,
-        Scalar::U16 => 65535.0,
-        Scalar::F32 | Scalar::F64 => 1.0,
-        other => return (None, Some(format!("`{}` is of type {}", red.name, other.ply_name()))),
+    let (full, is_wider) = match red.scalar {
+        Scalar::U8 => (255.0, false),
+        Scalar::U16 => (65535.0, false),
+        Scalar::F32 | Scalar::F64 => (1.0, true),
+        // Bytes in a wider type, as programs write them that know no other whole numbers.
+        Scalar::I16 | Scalar::I32 | Scalar::U32 | Scalar::I64 | Scalar::U64 => (255.0, true),
+        Scalar::I8 => return (None, Some(format!("`{}` is of type char", red.name))),
     };
     if green.scalar != red.scalar || blue.scalar != red.scalar {
         return (None, Some(format!("`{}` are of different types", names.join("`, `"))));
     }
-    (Some(Color { scalar: red.scalar, offsets: [red.offset, green.offset, blue.offset], full }), None)
+    (Some(Color { scalar: red.scalar, offsets: [red.offset, green.offset, blue.offset], full, is_wider }), None)
 }

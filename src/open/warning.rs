@@ -29,6 +29,17 @@ pub enum Warning {
         /// Bytes behind the last element.
         bytes: u64,
     },
+    /// Header lines that begin with no word of PLY, in a file that is whole without them.
+    HeaderLinesSkipped {
+        /// The file.
+        path: String,
+        /// The first such line, counted from 1.
+        line: u64,
+        /// What it says.
+        text: String,
+        /// How many there are.
+        lines: u64,
+    },
     /// Colour properties of a type or range that is not read.
     ColoursIgnored {
         /// The file.
@@ -81,6 +92,17 @@ impl fmt::Display for Warning {
                 "{path}: {bytes} bytes follow the last element that the header declares; they are ignored\nhelp: if \
                  faces are missing, the header is wrong; export the mesh again"
             ),
+            Warning::HeaderLinesSkipped { path, line, text, lines } => {
+                write!(f, "{path}: header line {line} is skipped")?;
+                if *lines > 1 {
+                    write!(f, ", and {} more", lines - 1)?;
+                }
+                write!(
+                    f,
+                    ": `{text}` begins with no PLY keyword, and the data are whole without it\nhelp: if it is a comment, \
+                     put `comment` before it"
+                )
+            }
             Warning::ColoursIgnored { path, reason } => write!(
                 f,
                 "{path}: colours are ignored: {reason}\nhelp: export colours as uchar (0 to 255), ushort (0 to 65535) \

@@ -160,6 +160,21 @@ fn every_encoding_holds_the_same_patch() {
     same(&[&edge, &faces(), &colored, &edge_again()]);
 }
 
+#[test]
+fn a_file_without_faces_is_a_cloud_in_every_encoding() {
+    let no_faces = Element::new("face").lists("list uchar int vertex_indices", []);
+    let no_strips = Element::new("tristrips").lists("list int int vertex_indices", []);
+    for encoding in ["binary_little_endian", "ascii", "binary_big_endian"] {
+        for elements in [vec![&vertices()], vec![&vertices(), &no_faces], vec![&no_strips, &vertices(), &edge_again()]]
+        {
+            let reach = opened(&file_in(encoding, &elements));
+            assert!(reach.is_cloud());
+            assert_eq!((reach.vertices(), reach.faces(), reach.triangles()), (5, 0, 0));
+            assert_eq!(reach.input_bounds(), ([1.0, 2.0, -0.25], [2.0, 3.0, 1.0]), "{encoding}");
+        }
+    }
+}
+
 fn edge_again() -> Element {
     Element::new("light").numbers("double x", [0.5])
 }
@@ -250,7 +265,7 @@ fn colours_that_cannot_be_meant_are_ignored_with_a_warning() {
     let add = |kind: &str, value: f64| {
         ["red", "green", "blue"].iter().fold(vertices(), |e, name| e.numbers(&format!("{kind} {name}"), [value; 5]))
     };
-    for (kind, value) in [("float", 200.0), ("float", f64::NAN), ("int", 1.0)] {
+    for (kind, value) in [("float", 200.0), ("float", f64::NAN), ("int", 256.0), ("short", -1.0), ("char", 1.0)] {
         let (reach, warnings) = open_bytes(&file(&[&add(kind, value), &faces()])).expect("readable");
         assert!(!reach.has_colors());
         assert!(matches!(warnings.as_slice(), [Warning::ColoursIgnored { .. }]), "{warnings:?}");

@@ -1,12 +1,15 @@
 //! The `open` stage and `inspect`, from bytes built here and from files of other software.
 
+mod counted;
 mod files_of_others;
 mod georeference;
+mod headers;
 mod layouts;
 mod malformed;
 mod plausible;
 mod ply_bytes;
 mod random_damage;
+mod same_surface;
 mod several_files;
 mod side_files;
 

@@ -96,14 +96,6 @@ fn coordinates_that_are_no_numbers_name_vertex_and_property() {
 }
 
 #[test]
-fn a_cloud_is_refused_with_what_to_do() {
-    let no_faces = Element::new("face").lists("list uchar int vertex_indices", []);
-    for bytes in [file(&[&vertices(), &no_faces]), file(&[&vertices()])] {
-        assert_contains(&refusal(&bytes), &["5 vertices but no faces", "point cloud", "mesh it"]);
-    }
-}
-
-#[test]
 fn no_vertices_are_refused() {
     let none = Element::new("vertex").numbers("float x", []).numbers("float y", []).numbers("float z", []);
     assert_contains(&refusal(&file(&[&none, &faces()])), &["0 vertices"]);
@@ -192,10 +184,58 @@ fn counts_beyond_any_file_are_refused_without_allocating() {
 #[test]
 fn a_list_length_beyond_the_file_is_a_truncation() {
     let lists: Vec<Vec<f64>> = corner_lists().collect();
-    let mut bytes = file(&[&vertices(), &Element::new("face").lists("list uint int vertex_indices", lists)]);
+    let declarations = [("uint", 4), ("uint64", 8)];
+    for (kind, size) in declarations {
+        let faces = Element::new("face").lists(&format!("list {kind} int vertex_indices"), lists.clone());
+        for (encoding, turned) in [("binary_little_endian", false), ("binary_big_endian", true)] {
+            let mut bytes = file_in(encoding, &[&vertices(), &faces]);
+            let at = bytes.len() - size - 12;
+            let mut length = 65_536u64.to_le_bytes()[..size].to_vec();
+            if turned {
+                length.reverse();
+            }
+            bytes[at..at + size].copy_from_slice(&length);
+            assert_contains(&refusal(&bytes), &["face 3 of 4", "ends at byte"]);
+        }
+    }
+    // Of an element that is not needed, too, where places would overflow.
+    let edges = Element::new("edge")
+        .lists("list uint64 double ends", [vec![], vec![]])
+        .lists("list uint64 int more", [vec![], vec![]]);
+    for encoding in ["binary_little_endian", "binary_big_endian"] {
+        for value in [1u64 << 62, (1 << 63) - 1, (1 << 61) + 3] {
+            let mut bytes = file_in(encoding, &[&vertices(), &faces(), &edges]);
+            let at = bytes.len() - 16;
+            bytes[at..at + 8].copy_from_slice(&if encoding == "binary_big_endian" {
+                value.to_be_bytes()
+            } else {
+                value.to_le_bytes()
+            });
+            assert_contains(&refusal(&bytes), &["edge 1 of 2", "ends at byte"]);
+        }
+    }
+}
+
+#[test]
+fn a_face_of_more_corners_than_any_polygon_is_refused_in_every_encoding() {
+    let round = |corners: usize| {
+        Element::new("face").lists(
+            "list uint int vertex_indices",
+            [vec![0.0, 1.0, 2.0], (0..corners).map(|i| (i % 5) as f64).collect()],
+        )
+    };
+    for encoding in ["binary_little_endian", "binary_big_endian", "ascii"] {
+        let (reach, _) =
+            open_bytes(&file_in(encoding, &[&vertices(), &round(65_536)])).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(reach.triangles(), 65_535);
+        let message = refusal(&file_in(encoding, &[&vertices(), &round(65_537)]));
+        assert_contains(&message, &["face 1 has 65537 corners (byte ", "65536", "triangulate"]);
+    }
+    // Whatever the file could hold.
+    let mut bytes = file(&[&vertices(), &round(3)]);
     let at = bytes.len() - 16;
     bytes[at..at + 4].copy_from_slice(&u32::MAX.to_le_bytes());
-    assert_contains(&refusal(&bytes), &["face 3 of 4", "ends at byte"]);
+    assert_contains(&refusal(&bytes), &[&format!("face 1 has 4294967295 corners (byte {at})")]);
 }
 
 #[test]

@@ -87,6 +87,8 @@ fn push(out: &mut Vec<u8>, kind: &str, value: f64) {
         "ushort" | "uint16" => out.extend((value as u16).to_le_bytes()),
         "int" | "int32" => out.extend((value as i32).to_le_bytes()),
         "uint" | "uint32" => out.extend((value as u32).to_le_bytes()),
+        "int64" => out.extend((value as i64).to_le_bytes()),
+        "uint64" => out.extend((value as u64).to_le_bytes()),
         "float" | "float32" => out.extend((value as f32).to_le_bytes()),
         "double" | "float64" => out.extend(value.to_le_bytes()),
         other => panic!("no such type: {other}"),
@@ -111,12 +113,13 @@ pub(crate) fn file_with(elements: &[&Element], newline: &str) -> Vec<u8> {
     bytes
 }
 
-/// A whole file in another encoding: `ascii` or `binary_big_endian`.
+/// A whole file in this encoding.
 pub(crate) fn file_in(encoding: &str, elements: &[&Element]) -> Vec<u8> {
     let mut bytes = header(elements, "\n").replace("binary_little_endian", encoding).into_bytes();
     for element in elements {
         match encoding {
             "ascii" => element.payload(&mut bytes, push_text),
+            "binary_little_endian" => element.payload(&mut bytes, push),
             _ => element.payload(&mut bytes, push_turned),
         }
     }
