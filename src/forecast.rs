@@ -70,7 +70,12 @@ pub fn whole_bytes(reach: &Reach) -> u64 {
     least_bytes(reach).max(fixed_bytes(reach) + TileMesh::footprint_bytes(reach.triangles().min(LARGEST_CORE as u64)))
 }
 
-/// Memory in which the index is built.
+/// Memory in which files are welded, bytes: nothing else is there yet.
+pub fn weld_bytes(memory: u64) -> u64 {
+    memory.saturating_sub(BASE_BYTES)
+}
+
+/// Memory in which the index is built, and tiles are worked.
 ///
 /// # Errors
 /// The budget is too small.

@@ -3,8 +3,8 @@
 //! The modules are the river, in the order in which the data flows:
 //!
 //! ```text
-//!  open ──> index ──> tile ──> curvature ──> segment ──> measure ──> stitch ──> statistics ──> write
-//!                      └──────────── per tile, in the pipeline ────────────┘
+//!  open ──> weld ──> index ──> tile ──> curvature ──> segment ──> measure ──> stitch ──> statistics ──> write
+//!                               └──────────── per tile, in the pipeline ────────────┘
 //! ```
 //!
 //! [`run`] is the page that shows all of it. A stage may use the stages above it, never those below;
@@ -17,6 +17,8 @@ pub mod settings;
 
 // The river. Blank lines keep the order.
 pub mod open;
+
+pub mod weld;
 
 pub mod index;
 
@@ -43,6 +45,7 @@ pub mod costs;
 pub mod cuts;
 pub mod demo;
 pub mod error;
+pub mod facts;
 pub mod forecast;
 pub mod inspect;
 pub mod passes;

@@ -93,6 +93,7 @@ fn inspect_command(args: &InspectArgs) -> Result<ExitCode, Error> {
         unit: args.unit.unwrap_or_default(),
         crs: args.crs.clone().unwrap_or_default(),
         offset: args.offset.map_or([0.0; 3], |o| o.0),
+        ..InputSettings::default()
     };
     let inspection = gravelometer::inspect::inspect(&args.inputs, &input)?;
     if args.json {

@@ -4,10 +4,11 @@ use crate::costs::{Costs, Meter};
 use crate::curvature::{InstructionSet, Stencil};
 use crate::cuts::{GrainCores, curvature_core, grain_cores};
 use crate::error::Error;
+use crate::facts::facts;
 use crate::forecast;
 use crate::index::{BuildRoom, Index};
 use crate::measure::Wanted;
-use crate::open::Reach;
+use crate::open::{Reach, Surface};
 use crate::passes::{Probe, Recipe, Survey};
 use crate::pipeline::{Budget, Control, Crew, LostJob, beside, memory_there_bytes, return_free_memory};
 use crate::progress::{Progress, Unit};
@@ -17,8 +18,9 @@ use crate::settings::{Instructions, Settings};
 use crate::statistics::RasterGrid;
 use crate::stitch::{Catalogue, TileReport, stitch};
 use crate::tile::Plan;
+use crate::weld::{self, WeldFacts, Welded, parts, weld};
 use crate::write::{OutputFolder, REPORT, Results, WholeMesh, WriteError, write_unnamed};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// What to run.
@@ -100,27 +102,29 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     // open
     let (reach, warnings) = pool.install(|| open(job, progress))?;
     control.check()?;
-    let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+    let mut warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
     warnings.iter().for_each(|w| progress.warn(w));
     let mut findings = work.begin(&reach, settings, job.resume)?;
 
-    // index
+    // weld and index
     let room = forecast::room(&reach, memory)?;
     let budget = (room.bytes, forecast::fixed_bytes(&reach));
     let crew = Crew { pool, budget: Budget::strict(room.bytes), control: control.clone() };
-    let earlier = work.index(&reach)?;
+    let earlier = work.index(&reach, settings)?;
     let made = earlier.is_none();
-    let mut index = match earlier {
-        Some(index) => index,
+    let (mut index, weld) = match earlier {
+        Some(found) => found,
         None => {
+            let (welded, weld) = welded(&reach, settings, forecast::weld_bytes(memory), &crew, progress)?;
             let disk = forecast::disk(&reach, room, &work.path().display().to_string(), work.free_bytes())?;
             progress.note(&format!("the index takes {} MiB in {}", disk >> 20, work.path().display()));
-            make_index(&reach, &work, room, &crew, progress)?
+            (make_index(&welded, &work, room, &crew, progress)?, weld)
         }
     };
+    warnings.extend(tell_of_weld(&reach, weld.as_ref(), progress));
 
     // plan, and tile by tile: spacing; the disk takes the index meanwhile, also that of a run that is to stop
-    let keep = || if made { work.keep_index(&reach, &index) } else { Ok(()) };
+    let keep = || if made { work.keep_index((&reach, settings), &index, weld.as_ref()) } else { Ok(()) };
     let (kept, planned) = beside(keep, || {
         control.check()?;
         check_outputs(&reach, &index, settings)?;
@@ -176,6 +180,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
 
     // statistics and write
     let mut facts = facts(&reach, &index, &plan, &warnings, &lost);
+    facts["weld"] = serde_json::json!(weld);
     let segmented_per_triangle = segmented_per_triangle(&tiles, probe.segmented);
     facts["segmented_per_triangle"] = segmented_per_triangle.into();
     let curvature_per_triangle = (owned > 0).then(|| loaded as f64 / owned as f64);
@@ -237,17 +242,48 @@ fn memory_bytes(settings: &Settings) -> u64 {
     })
 }
 
+/// The files as one surface. Says nothing of a single one.
+fn welded<'a>(
+    reach: &'a Reach,
+    settings: &Settings,
+    room_bytes: u64,
+    crew: &Crew,
+    progress: &dyn Progress,
+) -> Result<(Welded<'a>, Option<WeldFacts>), Error> {
+    let several = reach.files().len() > 1;
+    if several {
+        progress.begin("weld", reach.triangles(), Unit::Triangles);
+    }
+    let done = crew.pool.install(|| weld(reach, settings.input.weld_m, room_bytes));
+    if several {
+        progress.advance(reach.triangles());
+        progress.end();
+    }
+    crew.control.check()?;
+    Ok(done?)
+}
+
+fn tell_of_weld(reach: &Reach, facts: Option<&WeldFacts>, progress: &dyn Progress) -> Vec<String> {
+    let Some(facts) = facts else { return Vec::new() };
+    progress.note(&facts.summary());
+    let warnings: Vec<String> = weld::warnings(facts, &parts(reach)).iter().map(ToString::to_string).collect();
+    warnings.iter().for_each(|w| progress.warn(w));
+    warnings
+}
+
 fn make_index(
-    reach: &Reach,
+    welded: &Welded,
     work: &WorkFolder,
     room: BuildRoom,
     crew: &Crew,
     progress: &dyn Progress,
 ) -> Result<Index, Error> {
-    progress.begin("index", reach.triangles(), Unit::Triangles);
-    let index = crew.pool.install(|| work.make_index(|shelf| Index::build(reach, shelf, room)))?;
+    progress.begin("index", welded.triangles(), Unit::Triangles);
+    // What the weld takes is not there any more when tiles are worked.
+    let room = BuildRoom { bytes: room.bytes.saturating_sub(welded.bytes()), ..room };
+    let index = crew.pool.install(|| work.make_index(|shelf| Index::build(welded, shelf, room)))?;
     return_free_memory();
-    progress.advance(reach.triangles());
+    progress.advance(welded.triangles());
     progress.end();
     Ok(index)
 }
@@ -343,41 +379,4 @@ fn write(
 fn segmented_per_triangle(tiles: &[TileReport], probed: u64) -> f64 {
     let (loaded, owned) = tiles.iter().fold((probed, 0), |(l, o), t| (l + t.segmented_triangles, o + t.core_triangles));
     loaded as f64 / owned.max(1) as f64
-}
-
-/// What else belongs into `run.json`.
-fn facts(reach: &Reach, index: &Index, plan: &Plan, warnings: &[String], lost: &[LostJob]) -> serde_json::Value {
-    let absolute = |p: &Path| std::path::absolute(p).unwrap_or_else(|_| p.to_owned()).display().to_string();
-    let inputs: Vec<_> = reach
-        .files()
-        .iter()
-        .map(|f| {
-            serde_json::json!({
-                "path": absolute(f.path()),
-                "bytes": f.bytes(),
-                "vertices": f.vertices(),
-                "faces": f.faces(),
-                "triangles": f.triangles(),
-                "fingerprint": f.fingerprint(),
-            })
-        })
-        .collect();
-    let lost: Vec<_> = lost
-        .iter()
-        .map(|l| {
-            let core = index.grid.outline(&plan.tiles[l.job].core);
-            serde_json::json!({ "tile": plan.tiles[l.job].id, "core_min_m": core.min, "core_max_m": core.max, "message": l.message })
-        })
-        .collect();
-    serde_json::json!({
-        "inputs": inputs,
-        "warnings": warnings,
-        "lost_tiles": lost,
-        "tiles": plan.tiles.len(),
-        "core_m": plan.core_m(index),
-        "mean_edge_m": index.scale.mean_edge_m,
-        "mean_triangle_area_m2": index.scale.mean_triangle_area_m2,
-        "spacing_m": index.scale.spacing_m,
-        "zero_area_triangles": index.scale.zero_area_triangles,
-    })
 }

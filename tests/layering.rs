@@ -4,7 +4,8 @@
 use std::path::{Path, PathBuf};
 
 /// The river. A stage may use what stands before it.
-const RIVER: [&str; 9] = ["open", "index", "tile", "curvature", "segment", "measure", "stitch", "statistics", "write"];
+const RIVER: [&str; 10] =
+    ["open", "weld", "index", "tile", "curvature", "segment", "measure", "stitch", "statistics", "write"];
 /// What every stage may use.
 const SHARED: [&str; 2] = ["geometry", "settings"];
 /// What schedules, reports and keeps records; uses no stage.

@@ -21,12 +21,15 @@ pub struct Change {
 
 impl Identity {
     /// Of the surface: the index depends on nothing else.
-    pub(super) fn of_survey(reach: &Reach) -> Identity {
+    pub(super) fn of_survey(reach: &Reach, settings: &Settings) -> Identity {
         let mut names = Map::new();
         names.insert("program version".into(), env!("CARGO_PKG_VERSION").into());
         names.insert("number of inputs".into(), reach.files().len().into());
         for (i, file) in reach.files().iter().enumerate() {
             names.insert(format!("input {}", i + 1), serde_json::json!(file.fingerprint()));
+        }
+        if reach.files().len() > 1 {
+            names.insert("input.weld_m".into(), settings.input.weld_m.into());
         }
         let frame = reach.frame();
         names.insert("unit of the input, metres".into(), frame.metres_per_input_unit.to_string().into());

@@ -4,7 +4,7 @@
 //! | in the folder | holds | depends on |
 //! |---|---|---|
 //! | `gravelometer-work.lock` | nothing: it marks the folder as ours, and the run that uses it locks it | |
-//! | `index/` | the index | the inputs |
+//! | `index/` | the index, and what welding the files gave | the inputs, `input.weld_m` if they are several |
 //! | `curvature/` | spacing and divergence, tile by tile | the inputs, `[curvature]` |
 //! | `grains` | findings, tile by tile | the inputs and every setting that changes a result |
 //!
@@ -28,6 +28,7 @@ use crate::open::Reach;
 use crate::settings::Settings;
 use crate::store::{Ledger, Shelf, StoreError, fail_point};
 use crate::tile::CoreSize;
+use crate::weld::WeldFacts;
 use identity::Identity;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -36,6 +37,7 @@ use std::path::{Path, PathBuf};
 pub const WORK: &str = "gravelometer-work";
 const MARK: &str = "gravelometer-work.lock";
 const INDEX: &str = "index";
+const WELD: &str = "weld";
 const CURVATURE: &str = "curvature";
 const GRAINS: &str = "grains";
 
@@ -164,7 +166,8 @@ impl WorkFolder {
     /// What is resumed was another run, or the disk says no.
     pub fn begin(&mut self, reach: &Reach, settings: &Settings, resume: bool) -> Result<Findings, Error> {
         let outline_step_m = reach.frame().outline_step_m();
-        let identity = Identity::of_survey(reach).and_curvature(settings).and_grains(settings, outline_step_m);
+        let identity =
+            Identity::of_survey(reach, settings).and_curvature(settings).and_grains(settings, outline_step_m);
         if !resume {
             // What is not resumed must not be found later.
             self.shelf.remove(GRAINS);
@@ -182,12 +185,15 @@ impl WorkFolder {
         }
     }
 
-    /// The index of the survey, if it is there.
+    /// The index of the survey, if it is there, with what welding its files gave.
     ///
     /// # Errors
     /// The folder cannot be made.
-    pub fn index(&self, reach: &Reach) -> Result<Option<Index>, Error> {
-        Ok(Index::open(&self.shelf.inner(INDEX)?, &Identity::of_survey(reach).text()))
+    pub fn index(&self, reach: &Reach, settings: &Settings) -> Result<Option<(Index, Option<WeldFacts>)>, Error> {
+        let shelf = self.shelf.inner(INDEX)?;
+        let facts = || serde_json::from_slice(&shelf.get(WELD)?).ok();
+        let Some(weld) = facts() else { return Ok(None) };
+        Ok(Index::open(&shelf, &Identity::of_survey(reach, settings).text()).map(|index| (index, weld)))
     }
 
     /// Makes the index of the survey.
@@ -204,9 +210,16 @@ impl WorkFolder {
     ///
     /// # Errors
     /// The disk says no.
-    pub fn keep_index(&self, reach: &Reach, index: &Index) -> Result<(), StoreError> {
-        let keep = |shelf: &Shelf| index.keep(shelf, &Identity::of_survey(reach).text());
-        self.shelf.inner(INDEX).and_then(|shelf| keep(&shelf))
+    pub fn keep_index(
+        &self,
+        (reach, settings): (&Reach, &Settings),
+        index: &Index,
+        weld: Option<&WeldFacts>,
+    ) -> Result<(), StoreError> {
+        let shelf = self.shelf.inner(INDEX)?;
+        // Before the manifest, so that an index that is found has it. Plain numbers can always be put into text.
+        shelf.put(WELD, &serde_json::to_vec(&weld).unwrap_or_default())?;
+        index.keep(&shelf, &Identity::of_survey(reach, settings).text())
     }
 
     /// Makes room on a disk that could not keep an index: nothing that depends on it is worth keeping either.
@@ -220,7 +233,7 @@ impl WorkFolder {
     /// # Errors
     /// The disk says no.
     pub fn curvature(&self, reach: &Reach, index: &Index, settings: &Settings) -> Result<Curvature, Error> {
-        let identity = Identity::of_survey(reach).and_curvature(settings).text();
+        let identity = Identity::of_survey(reach, settings).and_curvature(settings).text();
         Ok(Curvature::open(&self.shelf.inner(CURVATURE)?, &identity, index)?)
     }
 

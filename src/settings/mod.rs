@@ -54,6 +54,9 @@ pub struct InputSettings {
     pub crs: String,
     /// East, north and up shift added to the coordinates to reach the CRS, in units of the CRS.
     pub offset: [f64; 3],
+    /// Vertices of different files that are as near as this are one, metres; 0 to choose it from the mean edge and
+    /// the precision of the coordinates.
+    pub weld_m: f64,
 }
 
 /// How curvature is computed (Rheinwalt et al. 2025, eq. 1 and 2).

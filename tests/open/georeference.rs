@@ -73,7 +73,7 @@ fn unknown_codes_carry_gdals_message() {
 fn units_come_from_the_setting_or_else_from_the_system() {
     let bytes = file(&[&vertices(), &faces()]);
     let open = |unit, crs: &str| {
-        let input = InputSettings { unit, crs: crs.into(), offset: [1000.0, 2000.0, 5.0] };
+        let input = InputSettings { unit, crs: crs.into(), offset: [1000.0, 2000.0, 5.0], ..InputSettings::default() };
         open_with("reach.ply", &bytes, &input).expect("readable").0
     };
     for (unit, crs, input_m, map_m) in [

@@ -1,0 +1,67 @@
+//! Whether files hold the same ground twice.
+//!
+//! Along a border that is cut cleanly, what two files cover of a square adds up to the square. Where it adds up to
+//! half a square more, they overlap by several triangles at least: no border looks like that.
+
+use super::facts::{Doubled, PairFacts};
+use super::near::{Cover, Near};
+use super::parts::Part;
+use crate::geometry::PlanBox;
+use crate::open::Frame;
+use std::collections::BTreeMap;
+
+/// A square is held twice where two files cover this much more than all of it together.
+const EXCESS: f64 = 0.5;
+/// Two sheets above each other, as far apart as this many squares are wide, are not the same surface: a bank that
+/// hangs over the bed, cut into files by height.
+const APART_SQUARES: f64 = 2.0;
+/// As many squares may be held twice by chance.
+const MOST_SQUARES: u64 = 4;
+/// Share of a file's triangles in squares that are held twice, above which the survey is refused: below it, few
+/// grains are found twice, which is said and no more.
+const MOST_SHARE: f64 = 1e-3;
+
+/// What each two files that come near each other have in common.
+pub(super) fn pairs(near: &Near, frame: &Frame) -> BTreeMap<[usize; 2], PairFacts> {
+    let mut pairs = BTreeMap::new();
+    for square in near.covers.chunk_by(|a, b| a.0.0 == b.0.0) {
+        for (i, &((square_number, first), a)) in square.iter().enumerate() {
+            for &((_, second), b) in &square[i + 1..] {
+                let pair: &mut PairFacts = pairs.entry([first, second]).or_default();
+                pair.files = [first, second];
+                pair.border_squares += 1;
+                pair.border_m = pair.border_squares as f64 * near.sheet.side_m();
+                if a.share() + b.share() - 1.0 > EXCESS {
+                    let apart = (a.height() - b.height()).abs() > APART_SQUARES;
+                    let twice = if apart { &mut pair.stacked } else { &mut pair.doubled };
+                    add(twice, (near, frame), square_number, [a, b]);
+                }
+            }
+        }
+    }
+    pairs
+}
+
+fn add(twice: &mut Doubled, (near, frame): (&Near, &Frame), square: u64, [a, b]: [Cover; 2]) {
+    let side_m = near.sheet.side_m();
+    twice.squares += 1;
+    twice.area_m2 += a.share().min(b.share()) * side_m * side_m;
+    twice.triangles[0] += a.triangles;
+    twice.triangles[1] += b.triangles;
+    let local = near.sheet.outline(square);
+    let input = |p: [f64; 2]| [0, 1].map(|i| p[i] / frame.metres_per_input_unit + frame.origin_input[i]);
+    twice.place.get_or_insert(PlanBox::EMPTY).merge(&PlanBox { min: input(local.min), max: input(local.max) });
+}
+
+impl Doubled {
+    /// Whether it is more than borders that were measured coarsely can explain.
+    pub(super) fn is_real(&self) -> bool {
+        self.squares > MOST_SQUARES
+    }
+
+    /// Whether so much is held twice that the result would mean nothing.
+    pub(super) fn is_too_much(&self, files: [&Part; 2]) -> bool {
+        let share = |i: usize| self.triangles[i] as f64 / files[i].size().max(1) as f64;
+        self.is_real() && share(0).max(share(1)) > MOST_SHARE
+    }
+}
