@@ -8,6 +8,7 @@ use crate::geometry::{DVec3, ExactSum};
 use crate::open::{Fingerprint, Frame, OpenError, Reach, Scalar, SurveyFile};
 use crate::pipeline::memory_there_bytes;
 use crate::settings::InputSettings;
+use crate::weld::{self, WeldFacts, weld};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -22,6 +23,8 @@ pub struct Inspection {
     pub survey: SurveyFigures,
     /// Each file, in the order given.
     pub files: Vec<FileFigures>,
+    /// What welding them gave; none for a single file, or where they cannot be welded, which is among the warnings.
+    pub weld: Option<WeldFacts>,
     /// What is odd about them, each with a remedy.
     pub warnings: Vec<String>,
 }
@@ -134,7 +137,16 @@ pub fn inspect(paths: &[PathBuf], input: &InputSettings) -> Result<Inspection, O
         suggestion: Suggestion::new(&surface, reach.has_colors()),
         needs: Needs::of(&reach, memory_there_bytes()),
     };
-    Ok(Inspection { survey, files, warnings: warnings.iter().map(ToString::to_string).collect() })
+    let mut warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+    let weld = weld(&reach, input.weld_m, u64::MAX).map(|(_, facts)| facts);
+    let weld = weld.unwrap_or_else(|refused| {
+        warnings.push(format!("a run would be refused: {refused}"));
+        None
+    });
+    if let Some(facts) = &weld {
+        warnings.extend(weld::warnings(facts, &weld::parts(&reach)).iter().map(ToString::to_string));
+    }
+    Ok(Inspection { survey, files, weld, warnings })
 }
 
 fn file_figures(file: &SurveyFile, sums: &Sums, frame: &Frame) -> FileFigures {
