@@ -88,6 +88,19 @@ pub fn room(reach: &Reach, memory: u64) -> Result<BuildRoom, ForecastError> {
     Ok(BuildRoom { bytes: memory - fixed_bytes(reach), ..BuildRoom::default() })
 }
 
+/// What of this memory is left for the index while the aliases of welded vertices are there as well.
+///
+/// # Errors
+/// Too little.
+pub fn index_room(reach: &Reach, room: BuildRoom, welded_bytes: u64) -> Result<BuildRoom, ForecastError> {
+    let (needed, memory) = (least_bytes(reach) + welded_bytes, fixed_bytes(reach) + room.bytes);
+    if needed > memory {
+        let (what, otherwise) = ("this survey of several files", "join them into one");
+        return Err(ForecastError::Memory { what, needed, memory, otherwise });
+    }
+    Ok(BuildRoom { bytes: room.bytes - welded_bytes, ..room })
+}
+
 /// Bytes that the work folder will take.
 ///
 /// # Errors

@@ -116,6 +116,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
         Some(found) => found,
         None => {
             let (welded, weld) = welded(&reach, settings, forecast::weld_bytes(memory), &crew, progress)?;
+            let room = forecast::index_room(&reach, room, welded.bytes())?;
             let disk = forecast::disk(&reach, room, &work.path().display().to_string(), work.free_bytes())?;
             progress.note(&format!("the index takes {} MiB in {}", disk >> 20, work.path().display()));
             (make_index(&welded, &work, room, &crew, progress)?, weld)
@@ -279,8 +280,6 @@ fn make_index(
     progress: &dyn Progress,
 ) -> Result<Index, Error> {
     progress.begin("index", welded.triangles(), Unit::Triangles);
-    // What the weld takes is not there any more when tiles are worked.
-    let room = BuildRoom { bytes: room.bytes.saturating_sub(welded.bytes()), ..room };
     let index = crew.pool.install(|| work.make_index(|shelf| Index::build(welded, shelf, room)))?;
     return_free_memory();
     progress.advance(welded.triangles());

@@ -125,6 +125,21 @@ pub fn inspect(paths: &[PathBuf], input: &InputSettings) -> Result<Inspection, O
     let files = reach.files().iter().zip(&sums).map(|(f, s)| file_figures(f, s, frame)).collect();
     let surface = sums.iter().fold(Sums::default(), |a, &b| a.merge(b)).figures(reach.triangles());
     let counts = [reach.vertices(), reach.faces(), reach.triangles()];
+    let mut warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+    let mut needs = Needs::of(&reach, memory_there_bytes());
+    let weld = match weld(&reach, input.weld_m, u64::MAX) {
+        Ok((welded, facts)) => {
+            needs.least_memory_bytes += welded.bytes();
+            facts
+        }
+        Err(refused) => {
+            warnings.push(format!("a run would be refused: {refused}"));
+            None
+        }
+    };
+    if let Some(facts) = &weld {
+        warnings.extend(weld::warnings(facts, &weld::parts(&reach)).iter().map(ToString::to_string));
+    }
     let survey = SurveyFigures {
         contents: Contents::new(counts, reach.input_bounds(), frame),
         crs_name: frame.crs.as_ref().map(|c| c.name.clone()),
@@ -135,17 +150,8 @@ pub fn inspect(paths: &[PathBuf], input: &InputSettings) -> Result<Inspection, O
         has_colors: reach.has_colors(),
         surface,
         suggestion: Suggestion::new(&surface, reach.has_colors()),
-        needs: Needs::of(&reach, memory_there_bytes()),
+        needs,
     };
-    let mut warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
-    let weld = weld(&reach, input.weld_m, u64::MAX).map(|(_, facts)| facts);
-    let weld = weld.unwrap_or_else(|refused| {
-        warnings.push(format!("a run would be refused: {refused}"));
-        None
-    });
-    if let Some(facts) = &weld {
-        warnings.extend(weld::warnings(facts, &weld::parts(&reach)).iter().map(ToString::to_string));
-    }
     Ok(Inspection { survey, files, weld, warnings })
 }
 

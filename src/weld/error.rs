@@ -47,7 +47,7 @@ pub enum WeldError {
     },
     /// Too much lies near other files.
     #[error(
-        "joining the files needs {} MiB of memory, and the budget is {} MiB: {near} vertices lie near another file\nhelp: give more with --memory, or join the files into one",
+        "joining the files needs {} MiB of memory beside that of the program, and --memory leaves {} MiB: {near} vertices lie near another file\nhelp: give more with --memory, or join the files into one",
         needed.div_ceil(1 << 20),
         room >> 20
     )]

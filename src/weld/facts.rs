@@ -36,9 +36,10 @@ pub struct PairFacts {
 /// Ground that two files cover.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Doubled {
-    /// Squares of eight mean edges in which both cover nearly all.
+    /// Squares of eight mean edges of which both cover so much that it is half a square more than there is.
     pub squares: u64,
-    /// Area in plan, m².
+    /// Area in plan that both cover, m²: all that both cover of these squares, and what is more than there is of those
+    /// in which it is less than half a square.
     pub area_m2: f64,
     /// Triangles of the first and of the second file in these squares.
     pub triangles: [u64; 2],
@@ -55,7 +56,7 @@ impl WeldFacts {
 
     /// In one line.
     pub fn summary(&self) -> String {
-        let tolerance = format!("{:.3} mm", self.tolerance_m * 1e3);
+        let tolerance = format!("{:.1e} m", self.tolerance_m);
         match self.welded_files() {
             0 => format!("no vertices of different files lie within {tolerance} of each other, so none were welded"),
             files => format!("{} vertices welded between {files} files, within {tolerance}", self.welded_vertices),

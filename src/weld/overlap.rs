@@ -12,6 +12,8 @@ use std::collections::BTreeMap;
 
 /// A square is held twice where two files cover this much more than all of it together.
 const EXCESS: f64 = 0.5;
+/// Below this, it is due to the triangles on the sides of the square, which count as a whole.
+const LEAST_EXCESS: f64 = 0.1;
 /// Two sheets above each other, as far apart as this many squares are wide, are not the same surface: a bank that
 /// hangs over the bed, cut into files by height.
 const APART_SQUARES: f64 = 2.0;
@@ -23,6 +25,7 @@ const MOST_SHARE: f64 = 1e-3;
 
 /// What each two files that come near each other have in common.
 pub(super) fn pairs(near: &Near, frame: &Frame) -> BTreeMap<[usize; 2], PairFacts> {
+    let input = |p: [f64; 2]| [0, 1].map(|i| p[i] / frame.metres_per_input_unit + frame.origin_input[i]);
     let mut pairs = BTreeMap::new();
     for square in near.covers.chunk_by(|a, b| a.0.0 == b.0.0) {
         for (i, &((square_number, first), a)) in square.iter().enumerate() {
@@ -31,10 +34,17 @@ pub(super) fn pairs(near: &Near, frame: &Frame) -> BTreeMap<[usize; 2], PairFact
                 pair.files = [first, second];
                 pair.border_squares += 1;
                 pair.border_m = pair.border_squares as f64 * near.sheet.side_m();
-                if a.share() + b.share() - 1.0 > EXCESS {
+                let excess = a.share() + b.share() - 1.0;
+                if excess > LEAST_EXCESS {
                     let apart = (a.height() - b.height()).abs() > APART_SQUARES;
                     let twice = if apart { &mut pair.stacked } else { &mut pair.doubled };
-                    add(twice, (near, frame), square_number, [a, b]);
+                    // Where it is certain, holes in both need not be made up for.
+                    let share = if excess > EXCESS { a.share().min(b.share()) } else { excess };
+                    twice.area_m2 += share * near.sheet.side_m() * near.sheet.side_m();
+                    if excess > EXCESS {
+                        let local = near.sheet.outline(square_number);
+                        add(twice, [a, b], &PlanBox { min: input(local.min), max: input(local.max) });
+                    }
                 }
             }
         }
@@ -42,15 +52,11 @@ pub(super) fn pairs(near: &Near, frame: &Frame) -> BTreeMap<[usize; 2], PairFact
     pairs
 }
 
-fn add(twice: &mut Doubled, (near, frame): (&Near, &Frame), square: u64, [a, b]: [Cover; 2]) {
-    let side_m = near.sheet.side_m();
+fn add(twice: &mut Doubled, [a, b]: [Cover; 2], place: &PlanBox) {
     twice.squares += 1;
-    twice.area_m2 += a.share().min(b.share()) * side_m * side_m;
     twice.triangles[0] += a.triangles;
     twice.triangles[1] += b.triangles;
-    let local = near.sheet.outline(square);
-    let input = |p: [f64; 2]| [0, 1].map(|i| p[i] / frame.metres_per_input_unit + frame.origin_input[i]);
-    twice.place.get_or_insert(PlanBox::EMPTY).merge(&PlanBox { min: input(local.min), max: input(local.max) });
+    twice.place.get_or_insert(PlanBox::EMPTY).merge(place);
 }
 
 impl Doubled {

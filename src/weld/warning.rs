@@ -65,10 +65,9 @@ impl fmt::Display for Warning {
             Warning::Unjoined { first, second, border_m, vertices, tolerance_m } => write!(
                 f,
                 "{first} and {second}: lie side by side for about {border_m:.2} m and have {vertices} vertices in \
-                 common (within {:.3} mm), so that a grain cut by their border counts twice\nhelp: export both from \
+                 common (within {tolerance_m:.1e} m), so that a grain cut by their border counts twice\nhelp: export both from \
                  one mesh, with the same offset and as many digits; if they are rounded differently, raise \
-                 input.weld_m",
-                tolerance_m * 1e3
+                 input.weld_m"
             ),
             Warning::Alone { path, nearest, gap_m } => write!(
                 f,
