@@ -103,7 +103,7 @@ fn pair_of(pairs: &mut BTreeMap<[usize; 2], PairFacts>, files: [usize; 2]) -> &m
 fn refuse_overlap(pair: &PairFacts, parts: &[Part]) -> Result<(), WeldError> {
     let files = pair.files.map(|i| &parts[i]);
     match pair.doubled.place {
-        Some(place) if pair.doubled.is_too_much(files) => {
+        Some(place) if pair.doubled.is_too_much(pair.border_squares, files) => {
             let [first, second] = files.map(|part| part.name.clone());
             Err(WeldError::Overlap { first, second, area_m2: pair.doubled.area_m2, place })
         }

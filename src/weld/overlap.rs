@@ -19,6 +19,9 @@ const LEAST_EXCESS: f64 = 0.1;
 const APART_SQUARES: f64 = 2.0;
 /// As many squares may be held twice by chance.
 const MOST_SQUARES: u64 = 4;
+/// So may this share of all that both files are in: where a reconstruction is folded, as between stones, what looks
+/// up of one fold and what looks down of the other may be in different files.
+const MOST_BORDER_SHARE: f64 = 0.02;
 /// Share of a file's triangles in squares that are held twice, above which the survey is refused: below it, few
 /// grains are found twice, which is said and no more.
 const MOST_SHARE: f64 = 1e-3;
@@ -61,13 +64,13 @@ fn add(twice: &mut Doubled, [a, b]: [Cover; 2], place: &PlanBox) {
 
 impl Doubled {
     /// Whether it is more than borders that were measured coarsely can explain.
-    pub(super) fn is_real(&self) -> bool {
-        self.squares > MOST_SQUARES
+    pub(super) fn is_real(&self, border_squares: u64) -> bool {
+        self.squares > MOST_SQUARES && self.squares as f64 > MOST_BORDER_SHARE * border_squares as f64
     }
 
     /// Whether so much is held twice that the result would mean nothing.
-    pub(super) fn is_too_much(&self, files: [&Part; 2]) -> bool {
+    pub(super) fn is_too_much(&self, border_squares: u64, files: [&Part; 2]) -> bool {
         let share = |i: usize| self.triangles[i] as f64 / files[i].size().max(1) as f64;
-        self.is_real() && share(0).max(share(1)) > MOST_SHARE
+        self.is_real(border_squares) && share(0).max(share(1)) > MOST_SHARE
     }
 }

@@ -98,7 +98,7 @@ const FEWEST_FOR_SQUARE: f64 = 1.0;
 /// A border shorter than so many squares is one in passing.
 const SHORTEST_SQUARES: f64 = 5.0;
 /// A file this near to another one, in diagonals of its box, was probably meant to touch it.
-const NEAR_DIAGONALS: f64 = 0.1;
+const NEAR_DIAGONALS: f64 = 0.25;
 
 /// What is odd, given what was found.
 pub(super) fn warnings(facts: &WeldFacts, parts: &[Part]) -> Vec<Warning> {
@@ -125,11 +125,11 @@ pub(super) fn warnings(facts: &WeldFacts, parts: &[Part]) -> Vec<Warning> {
 fn of_pair(pair: &PairFacts, tolerance_m: f64, parts: &[Part]) -> Vec<Warning> {
     let [first, second] = pair.files.map(|i| parts[i].name.clone());
     let mut warnings = Vec::new();
-    if pair.doubled.is_real() {
+    if pair.doubled.is_real(pair.border_squares) {
         let (first, second) = (first.clone(), second.clone());
         warnings.push(Warning::Doubled { first, second, area_m2: pair.doubled.area_m2 });
     }
-    if pair.stacked.is_real() {
+    if pair.stacked.is_real(pair.border_squares) {
         let (first, second) = (first.clone(), second.clone());
         warnings.push(Warning::Stacked { first, second, area_m2: pair.stacked.area_m2 });
     }

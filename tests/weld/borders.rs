@@ -69,6 +69,8 @@ fn a_bank_that_hangs_over_the_bed_is_no_overlap_but_is_said() {
 fn ragged_borders_are_no_overlap_and_a_tenth_of_the_otira_twice_is() {
     let Some((_, surface)) = otira() else { return };
     assert_eq!(judged(&grid(&surface, 2, 3, 0.05)).unwrap(), Vec::<String>::new());
+    let board = |p: DVec3| (((p.x / 0.5).floor() + (p.y / 0.5).floor()) as i64).rem_euclid(2) as usize;
+    assert_eq!(judged(&cut(&surface, board)).unwrap(), Vec::<String>::new());
     let (min, max) = bounds(&surface);
     let refused = judged(&overlapping(&surface, 0.1 * (max.x - min.x))).unwrap_err();
     assert!(matches!(refused, WeldError::Overlap { .. }), "{refused}");
