@@ -142,7 +142,7 @@ mod tests {
             tolerance_m(&parts, weld_m)
         };
         assert_eq!(of(1e-12, 0.0).unwrap_or(None), Some(1e-5));
-        assert_eq!(of(2e-5, 0.0).unwrap_or(None), Some(3e-5));
+        assert_eq!(of(2e-5, 0.0).unwrap_or(None), Some(1.5 * 2e-5));
         assert_eq!(of(2e-3, 0.0).unwrap_or(None), Some(1e-3));
         assert_eq!(of(2e-3, 2e-3).unwrap_or(None), Some(2e-3));
         assert!(matches!(of(2e-3, 6e-3), Err(WeldError::Tolerance { .. })));
