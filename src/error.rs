@@ -12,6 +12,7 @@ use crate::settings::SettingsError;
 use crate::statistics::RasterError;
 use crate::stitch::RecordError;
 use crate::store::StoreError;
+use crate::triangulate::DrapeError;
 use crate::weld::WeldError;
 use crate::write::WriteError;
 
@@ -25,6 +26,9 @@ pub enum Error {
     /// An input cannot be read.
     #[error(transparent)]
     Open(#[from] OpenError),
+    /// The cloud has no surface.
+    #[error(transparent)]
+    Drape(#[from] DrapeError),
     /// The files are not one surface.
     #[error(transparent)]
     Weld(#[from] WeldError),

@@ -3,8 +3,8 @@
 //! The modules are the river, in the order in which the data flows:
 //!
 //! ```text
-//!  open ──> weld ──> index ──> tile ──> curvature ──> segment ──> measure ──> stitch ──> statistics ──> write
-//!                               └──────────── per tile, in the pipeline ────────────┘
+//!  open ──> weld / triangulate ──> index ──> tile ──> curvature ──> segment ──> measure ──> stitch ──> statistics ──> write
+//!                                            └──────────── per tile, in the pipeline ────────────┘
 //! ```
 //!
 //! [`run`] is the page that shows all of it. A stage may use the stages above it, never those below;
@@ -19,6 +19,8 @@ pub mod settings;
 pub mod open;
 
 pub mod weld;
+
+pub mod triangulate;
 
 pub mod index;
 
@@ -51,3 +53,4 @@ pub mod inspect;
 pub mod passes;
 pub mod resume;
 pub mod run;
+pub mod surfaces;

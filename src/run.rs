@@ -17,8 +17,9 @@ use crate::segment::smallest_grain_area_m2;
 use crate::settings::{Instructions, Settings};
 use crate::statistics::RasterGrid;
 use crate::stitch::{Catalogue, TileReport, stitch};
+use crate::store::Shelf;
+use crate::surfaces::{WholeSurface, tell_of_weld};
 use crate::tile::Plan;
-use crate::weld::{self, WeldFacts, Welded, parts, weld};
 use crate::write::{OutputFolder, REPORT, Results, WholeMesh, WriteError, write_unnamed};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -98,6 +99,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let mut work = WorkFolder::open(job.work.as_deref(), &job.out)?;
     let (pool, memory) = (pool(settings)?, memory_bytes(settings));
     let (threads, instructions) = (pool.current_num_threads(), instructions(settings)?);
+    let labelled = settings.output.labelled_mesh;
 
     // open
     let (reach, warnings) = pool.install(|| open(job, progress))?;
@@ -106,26 +108,37 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     warnings.iter().for_each(|w| progress.warn(w));
     let mut findings = work.begin(&reach, settings, job.resume)?;
 
-    // weld and index
+    // index
     let room = forecast::room(&reach, memory)?;
     let budget = (room.bytes, forecast::fixed_bytes(&reach));
     let crew = Crew { pool, budget: Budget::strict(room.bytes), control: control.clone() };
     let earlier = work.index(&reach, settings)?;
     let made = earlier.is_none();
-    let (mut index, weld) = match earlier {
-        Some(found) => found,
+    let surface =
+        |shelf: &Shelf| crew.pool.install(|| WholeSurface::of(&reach, settings, (shelf, room.bytes), progress));
+    let mut whole = None;
+    let mut index = match earlier {
+        Some(index) => index,
         None => {
-            let (welded, weld) = welded(&reach, settings, forecast::weld_bytes(memory), &crew, progress)?;
-            let room = forecast::index_room(&reach, room, welded.bytes())?;
             let disk = forecast::disk(&reach, room, &work.path().display().to_string(), work.free_bytes())?;
             progress.note(&format!("the index takes {} MiB in {}", disk >> 20, work.path().display()));
-            (make_index(&welded, &work, room, &crew, progress)?, weld)
+            let surface = whole.insert(surface(&work.surface_shelf()?)?);
+            control.check()?;
+            let room = forecast::index_room(&reach, room, surface.welded_bytes())?;
+            let index = make_index(surface.surface(), &work, room, &crew, progress)?;
+            work.note_weld(surface.weld_facts())?;
+            surface.figures().map_or(Ok(()), |figures| work.note_figures(&figures))?;
+            index
         }
     };
+
+    let weld = work.weld_facts();
     warnings.extend(tell_of_weld(&reach, weld.as_ref(), progress));
 
     // plan, and tile by tile: spacing; the disk takes the index meanwhile, also that of a run that is to stop
-    let keep = || if made { work.keep_index((&reach, settings), &index, weld.as_ref()) } else { Ok(()) };
+    // Labels go back onto the surface; nothing else needs it any more.
+    whole = whole.filter(|whole| labelled && whole.cloud().is_some());
+    let keep = || if made { work.keep_index(&reach, settings, &index) } else { Ok(()) };
     let (kept, planned) = beside(keep, || {
         control.check()?;
         check_outputs(&reach, &index, settings)?;
@@ -154,7 +167,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
 
     // tile by tile: segment and measure
     let outline_step_m = reach.frame().outline_step_m();
-    let wanted = Wanted { outline_step_m, triangle_ids: settings.output.labelled_mesh };
+    let wanted = Wanted { outline_step_m, triangle_ids: labelled };
     let recipe =
         Recipe { settings: &settings.segment, divergence: curvature.divergence(), wanted, usual_width_m: None };
     let probe = match plans.cores.divisible || plans.grains.tiles.len() > 1 {
@@ -181,32 +194,37 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
 
     // statistics and write
     let mut facts = facts(&reach, &index, &plan, &warnings, &lost);
-    facts["weld"] = serde_json::json!(weld);
     let segmented_per_triangle = segmented_per_triangle(&tiles, probe.segmented);
     facts["segmented_per_triangle"] = segmented_per_triangle.into();
     let curvature_per_triangle = (owned > 0).then(|| loaded as f64 / owned as f64);
     facts["curvature_per_triangle"] = curvature_per_triangle.into();
     facts["identity"] = whole_identity(&reach, settings).into();
-    let mesh = WholeMesh::new(&reach);
+    facts["weld"] = serde_json::json!(weld);
+    facts["surface"] = serde_json::json!(work.figures());
+    if labelled && reach.is_cloud() && whole.is_none() {
+        whole = Some(surface(&work.surface_shelf()?)?);
+    }
+    let mesh = WholeMesh::new(&reach, whole.as_ref().and_then(WholeSurface::cloud));
+    let scale = index.scale.clone();
     let surveyed = index.triangles.occupied(&index.grid);
     let results = Results {
         frame: reach.frame(),
         settings,
-        scale: &index.scale,
+        scale: &scale,
         surveyed: &surveyed,
         catalogue: &catalogue,
         tiles: &tiles,
-        smallest_grain_area_m2: smallest_grain_area_m2(&index.scale, &settings.segment),
+        smallest_grain_area_m2: smallest_grain_area_m2(&scale, &settings.segment),
         facts: &facts,
         costs: &|| serde_json::json!(meter.costs()),
-        mesh: settings.output.labelled_mesh.then_some(&mesh),
+        mesh: labelled.then_some(&mesh),
     };
     let files = write(&folder, &results, progress, control)?;
     if lost.is_empty() {
         drop((index, curvature, findings));
         work.finish();
     }
-    let (triangles, costs) = (reach.triangles(), meter.costs());
+    let (triangles, costs) = (scale.triangles, meter.costs());
     Ok(Outcome { files, catalogue, lost, segmented_per_triangle, curvature_per_triangle, triangles, costs })
 }
 
@@ -243,46 +261,17 @@ fn memory_bytes(settings: &Settings) -> u64 {
     })
 }
 
-/// The files as one surface. Says nothing of a single one.
-fn welded<'a>(
-    reach: &'a Reach,
-    settings: &Settings,
-    room_bytes: u64,
-    crew: &Crew,
-    progress: &dyn Progress,
-) -> Result<(Welded<'a>, Option<WeldFacts>), Error> {
-    let several = reach.files().len() > 1;
-    if several {
-        progress.begin("weld", reach.triangles(), Unit::Triangles);
-    }
-    let done = crew.pool.install(|| weld(reach, settings.input.weld_m, room_bytes));
-    if several {
-        progress.advance(reach.triangles());
-        progress.end();
-    }
-    crew.control.check()?;
-    Ok(done?)
-}
-
-fn tell_of_weld(reach: &Reach, facts: Option<&WeldFacts>, progress: &dyn Progress) -> Vec<String> {
-    let Some(facts) = facts else { return Vec::new() };
-    progress.note(&facts.summary());
-    let warnings: Vec<String> = weld::warnings(facts, &parts(reach)).iter().map(ToString::to_string).collect();
-    warnings.iter().for_each(|w| progress.warn(w));
-    warnings
-}
-
 fn make_index(
-    welded: &Welded,
+    surface: &dyn Surface,
     work: &WorkFolder,
     room: BuildRoom,
     crew: &Crew,
     progress: &dyn Progress,
 ) -> Result<Index, Error> {
-    progress.begin("index", welded.triangles(), Unit::Triangles);
-    let index = crew.pool.install(|| work.make_index(|shelf| Index::build(welded, shelf, room)))?;
+    progress.begin("index", surface.triangles(), Unit::Triangles);
+    let index = crew.pool.install(|| work.make_index(|shelf| Index::build(surface, shelf, room)))?;
     return_free_memory();
-    progress.advance(welded.triangles());
+    progress.advance(surface.triangles());
     progress.end();
     Ok(index)
 }

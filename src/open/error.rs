@@ -56,6 +56,11 @@ pub enum OpenError {
          free some space there, or set TMPDIR to a folder with room for about the file's size"
     )]
     Scratch { path: String, folder: String, source: std::io::Error },
+    /// The triangles of a cloud cannot be read again.
+    #[error(
+        "the surface of the cloud cannot be mapped: {source}\nhelp: give the process more address space (ulimit -v)"
+    )]
+    Surface { source: std::io::Error },
     /// An element is declared twice.
     #[error(
         "{path}: the header declares element `{element}` twice\nhelp: export the mesh again with one `{element}` element"

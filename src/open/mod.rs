@@ -3,6 +3,7 @@
 mod bits;
 mod chunks;
 mod crs;
+mod draped;
 mod error;
 mod faces;
 mod frame;
@@ -25,6 +26,7 @@ mod warning;
 pub(crate) use bits::Bits;
 pub(crate) use chunks::{over_chunks, over_chunks_then, pieces};
 pub use crs::GeoReference;
+pub use draped::DrapedCloud;
 pub use error::OpenError;
 pub use frame::{Crs, Frame};
 pub use gdal_messages::{gdal_failures, listen_to_gdal};

@@ -217,6 +217,16 @@ impl Reach {
         file.mesh.vertices.color_in(file.mesh.bytes(), vertex - file.first_vertex, full).unwrap_or_default()
     }
 
+    /// Whether a point of a cloud is noise or withheld.
+    ///
+    /// # Panics
+    /// Above the last vertex.
+    #[inline]
+    pub fn is_skipped(&self, vertex: u64) -> bool {
+        let file = self.file_of(vertex, |f| f.first_vertex);
+        file.mesh.vertices.is_skipped(file.mesh.bytes(), vertex - file.first_vertex)
+    }
+
     /// Lets go of all pages of the files: they are read again when they are needed.
     pub fn release(&self) {
         self.files.iter().for_each(|f| f.mesh.release());

@@ -28,6 +28,7 @@ use crate::open::Reach;
 use crate::settings::Settings;
 use crate::store::{Ledger, Shelf, StoreError, fail_point};
 use crate::tile::CoreSize;
+use crate::triangulate::DrapeFigures;
 use crate::weld::WeldFacts;
 use identity::Identity;
 use std::fs::File;
@@ -37,8 +38,11 @@ use std::path::{Path, PathBuf};
 pub const WORK: &str = "gravelometer-work";
 const MARK: &str = "gravelometer-work.lock";
 const INDEX: &str = "index";
-const WELD: &str = "weld";
 const CURVATURE: &str = "curvature";
+/// What became of the points of a cloud, in the folder of its index.
+const FIGURES: &str = "surface.json";
+/// What welding the files gave, likewise.
+const WELD: &str = "weld.json";
 const GRAINS: &str = "grains";
 
 /// Where a run keeps what it needs again.
@@ -185,15 +189,47 @@ impl WorkFolder {
         }
     }
 
-    /// The index of the survey, if it is there, with what welding its files gave.
+    /// The index of the survey, if it is there.
     ///
     /// # Errors
     /// The folder cannot be made.
-    pub fn index(&self, reach: &Reach, settings: &Settings) -> Result<Option<(Index, Option<WeldFacts>)>, Error> {
-        let shelf = self.shelf.inner(INDEX)?;
-        let facts = || serde_json::from_slice(&shelf.get(WELD)?).ok();
-        let Some(weld) = facts() else { return Ok(None) };
-        Ok(Index::open(&shelf, &Identity::of_survey(reach, settings).text()).map(|index| (index, weld)))
+    pub fn index(&self, reach: &Reach, settings: &Settings) -> Result<Option<Index>, Error> {
+        Ok(Index::open(&self.shelf.inner(INDEX)?, &Identity::of_survey(reach, settings).text()))
+    }
+
+    /// Where the surface of a cloud is made.
+    ///
+    /// # Errors
+    /// The folder cannot be made.
+    pub fn surface_shelf(&self) -> Result<Shelf, StoreError> {
+        self.shelf.inner(INDEX)
+    }
+
+    /// Notes what became of the points of a cloud, for runs that use its index again.
+    ///
+    /// # Errors
+    /// The disk says no.
+    pub fn note_figures(&self, figures: &DrapeFigures) -> Result<(), StoreError> {
+        self.shelf.inner(INDEX)?.put(FIGURES, serde_json::json!(figures).to_string().as_bytes())
+    }
+
+    /// What became of the points of the cloud that was indexed.
+    pub fn figures(&self) -> Option<DrapeFigures> {
+        let noted = self.shelf.inner(INDEX).ok()?.get(FIGURES)?;
+        serde_json::from_slice(&noted).ok()
+    }
+
+    /// Notes what welding the files gave, for runs that use the index again.
+    ///
+    /// # Errors
+    /// The disk says no.
+    pub fn note_weld(&self, facts: Option<&WeldFacts>) -> Result<(), StoreError> {
+        self.shelf.inner(INDEX)?.put(WELD, serde_json::json!(facts).to_string().as_bytes())
+    }
+
+    /// What welding the files gave that were indexed; none of a single file.
+    pub fn weld_facts(&self) -> Option<WeldFacts> {
+        serde_json::from_slice(&self.shelf.inner(INDEX).ok()?.get(WELD)?).ok()?
     }
 
     /// Makes the index of the survey.
@@ -210,16 +246,9 @@ impl WorkFolder {
     ///
     /// # Errors
     /// The disk says no.
-    pub fn keep_index(
-        &self,
-        (reach, settings): (&Reach, &Settings),
-        index: &Index,
-        weld: Option<&WeldFacts>,
-    ) -> Result<(), StoreError> {
-        let shelf = self.shelf.inner(INDEX)?;
-        // Before the manifest, so that an index that is found has it. Plain numbers can always be put into text.
-        shelf.put(WELD, &serde_json::to_vec(&weld).unwrap_or_default())?;
-        index.keep(&shelf, &Identity::of_survey(reach, settings).text())
+    pub fn keep_index(&self, reach: &Reach, settings: &Settings, index: &Index) -> Result<(), StoreError> {
+        let keep = |shelf: &Shelf| index.keep(shelf, &Identity::of_survey(reach, settings).text());
+        self.shelf.inner(INDEX).and_then(|shelf| keep(&shelf))
     }
 
     /// Makes room on a disk that could not keep an index: nothing that depends on it is worth keeping either.

@@ -47,6 +47,12 @@ impl<'a> Welded<'a> {
     }
 }
 
+impl std::fmt::Debug for Welded<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Welded").field("aliases", &self.aliases.len()).finish_non_exhaustive()
+    }
+}
+
 impl Surface for Welded<'_> {
     fn vertices(&self) -> u64 {
         self.surface.vertices()
