@@ -205,7 +205,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
         whole = Some(surface(&work.surface_shelf()?)?);
     }
     let mesh = WholeMesh::new(&reach, whole.as_ref().and_then(WholeSurface::cloud));
-    let scale = index.scale.clone();
+    let scale = index.scale;
     let surveyed = index.triangles.occupied(&index.grid);
     let results = Results {
         frame: reach.frame(),
