@@ -13,6 +13,7 @@ use crate::statistics::RasterError;
 use crate::stitch::RecordError;
 use crate::store::StoreError;
 use crate::triangulate::DrapeError;
+use crate::weld::WeldError;
 use crate::write::WriteError;
 
 /// Why a run ended without a result.
@@ -28,6 +29,9 @@ pub enum Error {
     /// The cloud has no surface.
     #[error(transparent)]
     Drape(#[from] DrapeError),
+    /// The files are not one surface.
+    #[error(transparent)]
+    Weld(#[from] WeldError),
     /// The survey cannot be indexed.
     #[error(transparent)]
     Index(#[from] IndexError),
@@ -120,6 +124,7 @@ impl Error {
             Error::Settings(_) | Error::Instructions { .. } | Error::Raster(_) | Error::Forecast(_) => ExitCode::Usage,
             Error::Resume(ResumeError::Changed { .. } | ResumeError::Finished { .. }) => ExitCode::Usage,
             Error::Open(open) if open.is_about_settings() => ExitCode::Usage,
+            Error::Weld(WeldError::Tolerance { .. } | WeldError::Memory { .. }) => ExitCode::Usage,
             Error::Interrupted(_) => ExitCode::Interrupted,
             _ => ExitCode::Failed,
         }

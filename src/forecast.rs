@@ -72,7 +72,12 @@ pub fn whole_bytes(reach: &Reach) -> u64 {
         .max(fixed_bytes(reach) + TileMesh::footprint_bytes(triangles_to_expect(reach).min(LARGEST_CORE as u64)))
 }
 
-/// Memory in which the index is built.
+/// Memory in which files are welded, bytes, where `room` is that for the index: nothing else is there yet.
+pub fn weld_bytes(reach: &Reach, room: u64) -> u64 {
+    room + fixed_bytes(reach) - BASE_BYTES
+}
+
+/// Memory in which the index is built, and tiles are worked.
 ///
 /// # Errors
 /// The budget is too small.
@@ -83,6 +88,19 @@ pub fn room(reach: &Reach, memory: u64) -> Result<BuildRoom, ForecastError> {
         return Err(ForecastError::Memory { what: "this survey", needed, memory, otherwise });
     }
     Ok(BuildRoom { bytes: memory - fixed_bytes(reach), ..BuildRoom::default() })
+}
+
+/// What of this memory is left for the index while the aliases of welded vertices are there as well.
+///
+/// # Errors
+/// Too little.
+pub fn index_room(reach: &Reach, room: BuildRoom, welded_bytes: u64) -> Result<BuildRoom, ForecastError> {
+    let (needed, memory) = (least_bytes(reach) + welded_bytes, fixed_bytes(reach) + room.bytes);
+    if needed > memory {
+        let (what, otherwise) = ("this survey of several files", "join them into one");
+        return Err(ForecastError::Memory { what, needed, memory, otherwise });
+    }
+    Ok(BuildRoom { bytes: room.bytes - welded_bytes, ..room })
 }
 
 /// Bytes that the work folder will take.

@@ -3,8 +3,8 @@
 //! The modules are the river, in the order in which the data flows:
 //!
 //! ```text
-//!  open ──> triangulate ──> index ──> tile ──> curvature ──> segment ──> measure ──> stitch ──> statistics ──> write
-//!                                      └──────────── per tile, in the pipeline ────────────┘
+//!  open ──> weld / triangulate ──> index ──> tile ──> curvature ──> segment ──> measure ──> stitch ──> statistics ──> write
+//!                                            └──────────── per tile, in the pipeline ────────────┘
 //! ```
 //!
 //! [`run`] is the page that shows all of it. A stage may use the stages above it, never those below;
@@ -17,6 +17,8 @@ pub mod settings;
 
 // The river. Blank lines keep the order.
 pub mod open;
+
+pub mod weld;
 
 pub mod triangulate;
 
@@ -45,6 +47,7 @@ pub mod costs;
 pub mod cuts;
 pub mod demo;
 pub mod error;
+pub mod facts;
 pub mod forecast;
 pub mod inspect;
 pub mod opening;

@@ -94,6 +94,7 @@ fn inspect_command(args: &InspectArgs) -> Result<ExitCode, Error> {
         crs: args.crs.clone().unwrap_or_default(),
         offset: args.offset.map_or([0.0; 3], |o| o.0),
         offset_file: args.offset_file.as_ref().map_or_else(String::new, |path| path.to_string_lossy().into_owned()),
+        ..InputSettings::default()
     };
     let inspection = gravelometer::inspect::inspect(&args.inputs, &input)?;
     if args.json {

@@ -4,6 +4,7 @@ use crate::costs::{Costs, Meter};
 use crate::curvature::{InstructionSet, Stencil};
 use crate::cuts::{GrainCores, curvature_core, grain_cores};
 use crate::error::Error;
+use crate::facts::facts;
 use crate::forecast;
 use crate::index::{BuildRoom, Index};
 use crate::measure::Wanted;
@@ -18,10 +19,10 @@ use crate::settings::{Instructions, Settings};
 use crate::statistics::RasterGrid;
 use crate::stitch::{Catalogue, TileReport, stitch};
 use crate::store::Shelf;
-use crate::surfaces::WholeSurface;
+use crate::surfaces::{WholeSurface, tell_of_weld};
 use crate::tile::Plan;
 use crate::write::{OutputFolder, REPORT, Results, WholeMesh, WriteError, write_unnamed};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// What to run.
 #[derive(Debug, Clone)]
@@ -105,7 +106,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     // open
     let (reach, warnings) = pool.install(|| open_survey(&inputs, &settings.input, progress))?;
     control.check()?;
-    let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+    let mut warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
     warnings.iter().for_each(|w| progress.warn(w));
     let mut findings = work.begin(&reach, settings, job.resume)?;
 
@@ -125,15 +126,20 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
             progress.note(&format!("the index takes {} MiB in {}", disk >> 20, work.path().display()));
             let surface = whole.insert(surface(&work.surface_shelf()?)?);
             control.check()?;
+            let room = forecast::index_room(&reach, room, surface.welded_bytes())?;
             let index = make_index(surface.surface(), &work, room, &crew, progress)?;
+            work.note_weld(surface.weld_facts())?;
             surface.figures().map_or(Ok(()), |figures| work.note_figures(&figures))?;
             index
         }
     };
 
+    let weld = work.weld_facts();
+    warnings.extend(tell_of_weld(&reach, weld.as_ref(), progress));
+
     // plan, and tile by tile: spacing; the disk takes the index meanwhile, also that of a run that is to stop
     // Labels go back onto the surface; nothing else needs it any more.
-    whole = whole.filter(|_| labelled);
+    whole = whole.filter(|whole| labelled && whole.cloud().is_some());
     let keep = || if made { work.keep_index(&reach, settings, &index) } else { Ok(()) };
     let (kept, planned) = beside(keep, || {
         control.check()?;
@@ -195,6 +201,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let curvature_per_triangle = (owned > 0).then(|| loaded as f64 / owned as f64);
     facts["curvature_per_triangle"] = curvature_per_triangle.into();
     facts["identity"] = whole_identity(&reach, settings).into();
+    facts["weld"] = serde_json::json!(weld);
     facts["surface"] = serde_json::json!(work.figures());
     if labelled && reach.is_cloud() && whole.is_none() {
         whole = Some(surface(&work.surface_shelf()?)?);
@@ -350,42 +357,4 @@ fn write(
 fn segmented_per_triangle(tiles: &[TileReport], probed: u64) -> f64 {
     let (loaded, owned) = tiles.iter().fold((probed, 0), |(l, o), t| (l + t.segmented_triangles, o + t.core_triangles));
     loaded as f64 / owned.max(1) as f64
-}
-
-/// What else belongs into `run.json`.
-fn facts(reach: &Reach, index: &Index, plan: &Plan, warnings: &[String], lost: &[LostJob]) -> serde_json::Value {
-    let absolute = |p: &Path| std::path::absolute(p).unwrap_or_else(|_| p.to_owned()).display().to_string();
-    let inputs: Vec<_> = reach
-        .files()
-        .iter()
-        .map(|f| {
-            serde_json::json!({
-                "path": absolute(f.path()),
-                "bytes": f.bytes(),
-                "vertices": f.vertices(),
-                "faces": f.faces(),
-                "triangles": f.triangles(),
-                "fingerprint": f.fingerprint(),
-            })
-        })
-        .collect();
-    let lost: Vec<_> = lost
-        .iter()
-        .map(|l| {
-            let core = index.grid.outline(&plan.tiles[l.job].core);
-            serde_json::json!({ "tile": plan.tiles[l.job].id, "core_min_m": core.min, "core_max_m": core.max, "message": l.message })
-        })
-        .collect();
-    serde_json::json!({
-        "inputs": inputs,
-        "georeference": reach.georeference(),
-        "warnings": warnings,
-        "lost_tiles": lost,
-        "tiles": plan.tiles.len(),
-        "core_m": plan.core_m(index),
-        "mean_edge_m": index.scale.mean_edge_m,
-        "mean_triangle_area_m2": index.scale.mean_triangle_area_m2,
-        "spacing_m": index.scale.spacing_m,
-        "zero_area_triangles": index.scale.zero_area_triangles,
-    })
 }

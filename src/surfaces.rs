@@ -1,18 +1,20 @@
-//! The surface of a survey: of meshes as it is, of point clouds as it is laid over them.
+//! The surface of a survey: of meshes as it is, several files welded into one; of point clouds as it is laid over them.
 
 use crate::error::Error;
+use crate::forecast;
 use crate::open::{DrapedCloud, Reach, Surface};
 use crate::pipeline::return_free_memory;
 use crate::progress::{Progress, Unit};
 use crate::settings::Settings;
 use crate::store::Shelf;
 use crate::triangulate::{DrapeFigures, drape};
+use crate::weld::{self, WeldFacts, Welded, parts, weld};
 
 /// The surface of a survey.
 #[derive(Debug)]
 pub enum WholeSurface<'a> {
-    /// Of meshes.
-    Mesh(&'a Reach),
+    /// Of meshes, and what welding them gave.
+    Mesh(Welded<'a>, Option<WeldFacts>),
     /// Of point clouds, and what became of their points.
     Cloud(DrapedCloud<'a>, DrapeFigures),
 }
@@ -26,7 +28,7 @@ impl<'a> WholeSurface<'a> {
     /// The surface of a survey, in about `room` bytes, on all threads of the pool in which this runs.
     ///
     /// # Errors
-    /// The cloud has none, or the disk says no.
+    /// Files hold the same ground, the cloud has no surface, the memory is too small, or the disk says no.
     pub fn of(
         reach: &'a Reach,
         settings: &Settings,
@@ -34,7 +36,7 @@ impl<'a> WholeSurface<'a> {
         progress: &dyn Progress,
     ) -> Result<WholeSurface<'a>, Error> {
         if !reach.is_cloud() {
-            return Ok(WholeSurface::Mesh(reach));
+            return welded(reach, settings.input.weld_m, forecast::weld_bytes(reach, room), progress);
         }
         progress.begin("surface", reach.vertices(), Unit::Vertices);
         let draped = drape(reach, &|point| !reach.is_skipped(point), &settings.surface, (shelf, room))?;
@@ -48,7 +50,7 @@ impl<'a> WholeSurface<'a> {
     /// What is indexed.
     pub fn surface(&self) -> &dyn Surface {
         match self {
-            WholeSurface::Mesh(reach) => *reach,
+            WholeSurface::Mesh(welded, _) => welded,
             WholeSurface::Cloud(cloud, _) => cloud,
         }
     }
@@ -56,7 +58,7 @@ impl<'a> WholeSurface<'a> {
     /// The cloud and its triangles, if it is one.
     pub fn cloud(&self) -> Option<&DrapedCloud<'a>> {
         match self {
-            WholeSurface::Mesh(_) => None,
+            WholeSurface::Mesh(..) => None,
             WholeSurface::Cloud(cloud, _) => Some(cloud),
         }
     }
@@ -64,8 +66,53 @@ impl<'a> WholeSurface<'a> {
     /// What became of the points of a cloud.
     pub fn figures(&self) -> Option<DrapeFigures> {
         match self {
-            WholeSurface::Mesh(_) => None,
+            WholeSurface::Mesh(..) => None,
             WholeSurface::Cloud(_, figures) => Some(*figures),
         }
     }
+
+    /// What welding meshes gave; none of a single file.
+    pub fn weld_facts(&self) -> Option<&WeldFacts> {
+        match self {
+            WholeSurface::Mesh(_, facts) => facts.as_ref(),
+            WholeSurface::Cloud(..) => None,
+        }
+    }
+
+    /// Memory that knowing which vertices were welded takes, bytes.
+    pub fn welded_bytes(&self) -> u64 {
+        match self {
+            WholeSurface::Mesh(welded, _) => welded.bytes(),
+            WholeSurface::Cloud(..) => 0,
+        }
+    }
+}
+
+/// Meshes as one surface. Says nothing of a single one.
+fn welded<'a>(
+    reach: &'a Reach,
+    weld_m: f64,
+    room_bytes: u64,
+    progress: &dyn Progress,
+) -> Result<WholeSurface<'a>, Error> {
+    let several = reach.files().len() > 1;
+    if several {
+        progress.begin("weld", reach.triangles(), Unit::Triangles);
+    }
+    let done = weld(reach, weld_m, room_bytes);
+    if several {
+        progress.advance(reach.triangles());
+        progress.end();
+    }
+    let (welded, facts) = done?;
+    Ok(WholeSurface::Mesh(welded, facts))
+}
+
+/// Says what welding gave, and returns what is odd about it.
+pub fn tell_of_weld(reach: &Reach, facts: Option<&WeldFacts>, progress: &dyn Progress) -> Vec<String> {
+    let Some(facts) = facts else { return Vec::new() };
+    progress.note(&facts.summary());
+    let warnings: Vec<String> = weld::warnings(facts, &parts(reach)).iter().map(ToString::to_string).collect();
+    warnings.iter().for_each(|w| progress.warn(w));
+    warnings
 }

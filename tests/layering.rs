@@ -4,8 +4,19 @@
 use std::path::{Path, PathBuf};
 
 /// The river. A stage may use what stands before it.
-const RIVER: [&str; 10] =
-    ["open", "triangulate", "index", "tile", "curvature", "segment", "measure", "stitch", "statistics", "write"];
+const RIVER: [&str; 11] = [
+    "open",
+    "weld",
+    "triangulate",
+    "index",
+    "tile",
+    "curvature",
+    "segment",
+    "measure",
+    "stitch",
+    "statistics",
+    "write",
+];
 /// What every stage may use.
 const SHARED: [&str; 2] = ["geometry", "settings"];
 /// What schedules, reports and keeps records; uses no stage.

@@ -4,10 +4,8 @@
 
 use super::cells::{CellGrid, Steps};
 use crate::geometry::DVec3;
-use crate::open::Surface;
-use crate::open::{over_chunks, over_chunks_then, pieces};
+use crate::open::{Bits, Surface, over_chunks, over_chunks_then, pieces};
 use crate::store::StoreError;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 /// Triangles in an average cell: tiles are whole cells, so this is how finely a tile can be cut.
@@ -31,31 +29,6 @@ pub(super) struct Ground {
     pub(super) grid: CellGrid,
     /// Vertices in each row of cells.
     pub(super) in_row: Vec<u64>,
-}
-
-/// Bits that several threads may set.
-pub(super) struct Bits(Vec<AtomicU64>);
-
-impl Bits {
-    fn new(len: u64) -> Bits {
-        Bits((0..len.div_ceil(64)).map(|_| AtomicU64::new(0)).collect())
-    }
-
-    fn set(&self, i: u64) {
-        let (word, bit) = (&self.0[(i / 64) as usize], 1 << (i % 64));
-        // Most are set already, and looking is cheaper than locking.
-        if word.load(Ordering::Relaxed) & bit == 0 {
-            word.fetch_or(bit, Ordering::Relaxed);
-        }
-    }
-
-    pub(super) fn get(&self, i: u64) -> bool {
-        self.0[(i / 64) as usize].load(Ordering::Relaxed) >> (i % 64) & 1 == 1
-    }
-
-    fn count(&self) -> u64 {
-        self.0.iter().map(|word| u64::from(word.load(Ordering::Relaxed).count_ones())).sum()
-    }
 }
 
 /// Looks at the survey in a few sequential passes.

@@ -9,6 +9,9 @@ impl Display for Inspection {
             write_file(f, file)?;
         }
         write_survey(f, &self.survey, self.files.len())?;
+        if let Some(facts) = &self.weld {
+            row(f, "borders", facts.summary())?;
+        }
         for note in &self.notes {
             writeln!(f, "\nnote: {note}")?;
         }

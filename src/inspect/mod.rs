@@ -8,6 +8,7 @@ use crate::geometry::{DVec3, ExactSum};
 use crate::open::{Fingerprint, Frame, Georeference, OpenError, Reach, Scalar, SurveyFile, resolve_inputs};
 use crate::pipeline::memory_there_bytes;
 use crate::settings::InputSettings;
+use crate::weld::{self, WeldFacts, weld};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -24,6 +25,8 @@ pub struct Inspection {
     pub files: Vec<FileFigures>,
     /// What was found beside the files, or left out.
     pub notes: Vec<String>,
+    /// What welding them gave; none for a single file, or where they cannot be welded, which is among the warnings.
+    pub weld: Option<WeldFacts>,
     /// What is odd about them, each with a remedy.
     pub warnings: Vec<String>,
 }
@@ -117,16 +120,31 @@ pub fn inspect(paths: &[PathBuf], input: &InputSettings) -> Result<Inspection, O
     let files = reach.files().iter().zip(&sums).map(|(f, s)| file_figures(f, s, frame)).collect();
     let surface = sums.iter().fold(Sums::default(), |a, &b| a.merge(b)).figures(reach.triangles());
     let counts = [reach.vertices(), reach.faces(), reach.triangles()];
+    let mut warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+    let mut needs = Needs::of(&reach, memory_there_bytes());
+    let weld = match weld(&reach, input.weld_m, u64::MAX) {
+        Ok((welded, facts)) => {
+            needs.least_memory_bytes += welded.bytes();
+            facts
+        }
+        Err(refused) => {
+            warnings.push(format!("a run would be refused: {refused}"));
+            None
+        }
+    };
+    if let Some(facts) = &weld {
+        warnings.extend(weld::warnings(facts, &weld::parts(&reach)).iter().map(ToString::to_string));
+    }
     let survey = SurveyFigures {
         contents: Contents::new(counts, reach.input_bounds(), frame),
         georeference: reach.georeference().clone(),
         has_colors: reach.has_colors(),
         surface,
         suggestion: Suggestion::new(&surface, reach.has_colors()),
-        needs: Needs::of(&reach, memory_there_bytes()),
+        needs,
     };
     let notes = inputs.notes.iter().chain(&reach.georeference().notes).cloned().collect();
-    Ok(Inspection { survey, files, notes, warnings: warnings.iter().map(ToString::to_string).collect() })
+    Ok(Inspection { survey, files, notes, weld, warnings })
 }
 
 fn file_figures(file: &SurveyFile, sums: &Sums, frame: &Frame) -> FileFigures {

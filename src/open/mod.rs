@@ -1,5 +1,6 @@
 //! Opening a survey: files become arrays in one frame. Knows formats and georeferencing, nothing else.
 
+mod bits;
 mod chunks;
 mod crs;
 mod declared;
@@ -28,6 +29,7 @@ mod transcode;
 mod vertices;
 mod warning;
 
+pub(crate) use bits::Bits;
 pub(crate) use chunks::{over_chunks, over_chunks_then, pieces};
 pub use crs::GeoReference;
 pub use draped::DrapedCloud;

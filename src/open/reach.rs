@@ -28,6 +28,7 @@ pub struct Reach {
     frame: Frame,
     bounds: ([f64; 3], [f64; 3]),
     full_color: Option<f64>,
+    sampled_edges_m: Vec<Option<f64>>,
 }
 
 /// Longest survey along an axis, metres. Keeps squares and sums of areas far from the limits of their types.
@@ -62,8 +63,9 @@ impl Reach {
         let bytes = files.iter().all(|f| f.color_type() == Some(Scalar::U8));
         let has_colors = files.iter().all(|f| f.color_type().is_some());
         let full_color = has_colors.then_some(if bytes { 255.0 } else { 1.0 });
-        let reach = Reach { files, georeference, frame, bounds, full_color };
+        let mut reach = Reach { files, georeference, frame, bounds, full_color, sampled_edges_m: Vec::new() };
         let samples: Vec<_> = reach.files.iter().map(|file| EdgeSample::of(file, &reach.frame)).collect();
+        reach.sampled_edges_m = samples.iter().map(EdgeSample::mean_edge_m).collect();
         let mut coarse = Vec::new();
         for (file, sample) in reach.files.iter().zip(&samples) {
             if input.unit == Unit::Auto {
@@ -94,6 +96,11 @@ impl Reach {
     /// The files, in the order given.
     pub fn files(&self) -> &[SurveyFile] {
         &self.files
+    }
+
+    /// Mean edge of a sample of each file's triangles, metres; none for a file without an edge of any length.
+    pub fn sampled_edges_m(&self) -> &[Option<f64>] {
+        &self.sampled_edges_m
     }
 
     /// Number of vertices, unused ones included.
@@ -249,9 +256,6 @@ impl Reach {
     fn warnings(&self, input: &InputSettings, mean_edge_m: Option<f64>) -> Vec<Warning> {
         let mut warnings = Vec::new();
         let name = |file: &SurveyFile| file.path.display().to_string();
-        if let [first, _, ..] = self.files.as_slice() {
-            warnings.push(Warning::SeparateFiles { path: name(first), files: self.files.len() });
-        }
         if let (Some(first), Some(mean_edge_m)) = (self.files.first(), mean_edge_m)
             && input.unit == Unit::Auto
         {

@@ -6,13 +6,6 @@ use std::fmt;
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Warning {
-    /// Several files are one survey, but their vertices are not joined.
-    SeparateFiles {
-        /// The first file.
-        path: String,
-        /// How many files.
-        files: usize,
-    },
     /// Metres were assumed, but the figures look like millimetres.
     LooksLikeMillimetres {
         /// The first file.
@@ -75,12 +68,6 @@ pub enum Warning {
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Warning::SeparateFiles { path, files } => write!(
-                f,
-                "{path} and {} more: vertices are not joined across files in this version, so a grain cut by a border \
-                 between files counts once per file\nhelp: merge the meshes into one file where borders matter",
-                files - 1
-            ),
             Warning::LooksLikeMillimetres { path, mean_edge_m, extent_m } => write!(
                 f,
                 "{path}: taken as metres, the mean edge is {mean_edge_m:.3} m on an extent of {extent_m:.0} m, too \

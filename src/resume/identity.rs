@@ -29,6 +29,9 @@ impl Identity {
         for (i, file) in reach.files().iter().enumerate() {
             names.insert(format!("input {}", i + 1), serde_json::json!(file.fingerprint()));
         }
+        if reach.files().len() > 1 && !reach.is_cloud() {
+            names.insert("input.weld_m".into(), settings.input.weld_m.into());
+        }
         let frame = reach.frame();
         names.insert("unit of the input, metres".into(), frame.metres_per_input_unit.to_string().into());
         names.insert("origin, input units".into(), format!("{:?}", frame.origin_input).into());

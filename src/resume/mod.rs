@@ -4,7 +4,7 @@
 //! | in the folder | holds | depends on |
 //! |---|---|---|
 //! | `gravelometer-work.lock` | nothing: it marks the folder as ours, and the run that uses it locks it | |
-//! | `index/` | the index | the inputs |
+//! | `index/` | the index, and what welding the files gave | the inputs, `input.weld_m` if they are several |
 //! | `curvature/` | spacing and divergence, tile by tile | the inputs, `[curvature]` |
 //! | `grains` | findings, tile by tile | the inputs and every setting that changes a result |
 //!
@@ -29,6 +29,7 @@ use crate::settings::Settings;
 use crate::store::{Ledger, Shelf, StoreError, fail_point};
 use crate::tile::CoreSize;
 use crate::triangulate::DrapeFigures;
+use crate::weld::WeldFacts;
 use identity::Identity;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -40,6 +41,8 @@ const INDEX: &str = "index";
 const CURVATURE: &str = "curvature";
 /// What became of the points of a cloud, in the folder of its index.
 const FIGURES: &str = "surface.json";
+/// What welding the files gave, likewise.
+const WELD: &str = "weld.json";
 const GRAINS: &str = "grains";
 
 /// Where a run keeps what it needs again.
@@ -214,6 +217,19 @@ impl WorkFolder {
     pub fn figures(&self) -> Option<DrapeFigures> {
         let noted = self.shelf.inner(INDEX).ok()?.get(FIGURES)?;
         serde_json::from_slice(&noted).ok()
+    }
+
+    /// Notes what welding the files gave, for runs that use the index again.
+    ///
+    /// # Errors
+    /// The disk says no.
+    pub fn note_weld(&self, facts: Option<&WeldFacts>) -> Result<(), StoreError> {
+        self.shelf.inner(INDEX)?.put(WELD, serde_json::json!(facts).to_string().as_bytes())
+    }
+
+    /// What welding the files gave that were indexed; none of a single file.
+    pub fn weld_facts(&self) -> Option<WeldFacts> {
+        serde_json::from_slice(&self.shelf.inner(INDEX).ok()?.get(WELD)?).ok()?
     }
 
     /// Makes the index of the survey.

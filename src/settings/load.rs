@@ -96,6 +96,7 @@ impl Settings {
         let s = &self.segment;
         let not_negative = "must be a finite number, 0 or more";
         for (key, value) in [
+            ("input.weld_m", self.input.weld_m),
             ("segment.max_grain_m", s.max_grain_m),
             ("segment.min_grain_area_m2", s.min_grain_area_m2),
             ("segment.min_grain_triangles", s.min_grain_triangles),

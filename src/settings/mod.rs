@@ -63,6 +63,9 @@ pub struct InputSettings {
     /// A file that holds this shift, as OpenDroneMap, Pix4D and others write it; it may name the CRS as well.
     /// Empty: none.
     pub offset_file: String,
+    /// Vertices of different files that are as near as this are one, metres; 0 to choose it from the mean edge and
+    /// the precision of the coordinates.
+    pub weld_m: f64,
 }
 
 /// How a point cloud gets its surface. Meshes have one.
