@@ -5,12 +5,22 @@ mod error;
 mod faces;
 mod frame;
 mod gdal_messages;
+#[allow(dead_code)]
+mod las;
+#[allow(dead_code)]
+mod las_crs;
+#[allow(dead_code)]
+mod las_header;
+mod las_records;
+#[allow(dead_code)]
+mod laz_chunks;
 mod mapped;
 mod numbers;
 mod ply;
 mod ply_header;
 mod precision;
 mod progress;
+mod quiet;
 mod reach;
 mod records;
 mod scalar;

@@ -36,6 +36,11 @@ pub enum Warning {
         /// What is odd about them.
         reason: String,
     },
+    /// The file has fields for colours, but nothing in them.
+    ColorsAllZero {
+        /// The file.
+        path: String,
+    },
     /// Some files have colours and some do not.
     SomeFilesWithoutColours {
         /// The first file without.
@@ -67,6 +72,11 @@ impl fmt::Display for Warning {
                 f,
                 "{path}: colours are ignored: {reason}\nhelp: export colours as uchar (0 to 255), ushort (0 to 65535) \
                  or float (0 to 1)"
+            ),
+            Warning::ColorsAllZero { path } => write!(
+                f,
+                "{path}: red, green and blue are 0 at every point, so it is taken as a cloud without colours\nhelp: if the \
+                 survey has colours, export them with the points"
             ),
             Warning::SomeFilesWithoutColours { path } => write!(
                 f,
