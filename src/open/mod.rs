@@ -12,6 +12,8 @@ mod las_crs;
 #[allow(dead_code)]
 mod las_header;
 mod las_records;
+#[cfg(test)]
+mod las_tests;
 #[allow(dead_code)]
 mod laz_chunks;
 mod mapped;
