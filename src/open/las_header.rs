@@ -27,7 +27,13 @@ const FORMAT_BITS: u8 = 0x3f;
 /// The last point format there is.
 const LAST_FORMAT: u8 = 10;
 /// The `laszip encoded` record that says how points are compressed.
-const LASZIP_RECORD: (&str, u16) = ("laszip encoded", 22204);
+pub(crate) const LASZIP_RECORD: (&str, u16) = ("laszip encoded", 22204);
+
+/// Who defined the records of an octree, and the one that makes a LAZ file a cloud-optimised one.
+pub(crate) const COPC_USER: &str = "copc";
+const COPC_INFO: (&str, u16) = (COPC_USER, 1);
+/// The record of waveforms.
+const WAVEFORMS: (&str, u16) = ("LASF_Spec", 65535);
 
 /// A LAS or LAZ file that is mapped and not yet looked at.
 #[derive(Debug)]
@@ -57,6 +63,8 @@ impl LasInput {
 /// A record of variable length: who it is for, and its bytes in the file.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct VariableRecord<'a> {
+    /// Byte of the file at which it starts.
+    pub(crate) at: usize,
     /// Who defined it, without the zeros behind.
     pub(crate) user: &'a [u8],
     pub(crate) number: u16,
@@ -68,7 +76,12 @@ pub(crate) struct VariableRecord<'a> {
 impl VariableRecord<'_> {
     /// Whether it is the record of this user and number. Writers differ in upper and lower case.
     pub(crate) fn is(&self, (user, number): (&str, u16)) -> bool {
-        self.number == number && self.user.eq_ignore_ascii_case(user.as_bytes())
+        self.number == number && self.is_of(user)
+    }
+
+    /// Whether this user defined it.
+    pub(crate) fn is_of(&self, user: &str) -> bool {
+        self.user.eq_ignore_ascii_case(user.as_bytes())
     }
 }
 
@@ -172,6 +185,13 @@ impl<'a> LasFile<'a> {
         CloudCrs::of(self)
     }
 
+    /// The record of waveforms, where they lie in the same file. Version 1.3 does not list it.
+    pub(crate) fn waveforms(&self) -> Option<VariableRecord<'a>> {
+        let bytes: &'a [u8] = self.source.bytes;
+        let at = usize::try_from(self.header.start_of_waveform_data_packet_record?).ok()?.min(bytes.len());
+        read_records(bytes, at..bytes.len(), 1, true).ok()?.pop().filter(|r| r.is(WAVEFORMS))
+    }
+
     /// How whole numbers become coordinates.
     pub(crate) fn transforms(&self) -> Vector<Transform> {
         let h = &self.header;
@@ -209,9 +229,6 @@ impl<'a> LasFile<'a> {
         }
     }
 }
-
-/// The record that makes a LAZ file a cloud-optimised one.
-pub(crate) const COPC_INFO: (&str, u16) = ("copc", 1);
 
 /// The header by the grammar of the `las` crate, and the minor version.
 fn fixed_header(source: Source<'_>) -> Result<(raw::Header, u8), OpenError> {
@@ -305,6 +322,7 @@ fn read_records(
         let user = &start[2..18];
         let user = &user[..user.iter().position(|&b| b == 0).unwrap_or(user.len())];
         records.push(VariableRecord {
+            at,
             user,
             number: u16::from_le_bytes([start[18], start[19]]),
             data: &whole[head..],

@@ -72,7 +72,7 @@ impl Compression {
             other => return Err(refused(format!("the points are packed in way {other}; 1 to 3 are known"))),
         };
         let packed: Vec<LazItemType> = record.items().iter().map(laz::LazItem::item_type).collect();
-        let expected = items_of(&file.format);
+        let expected = laz_items(&file.format);
         let versions = if layout == Layout::Layers { 3..=4 } else { 1..=2 };
         if packed != expected || !record.items().iter().all(|item| versions.contains(&item.version())) {
             return Err(refused(format!(
@@ -235,7 +235,7 @@ fn table_place(bytes: &[u8], start: u64) -> Result<u64, String> {
 const SMALLEST_RECORD_BYTES: u64 = 20;
 
 /// What points of a format are packed as.
-pub(crate) fn items_of(format: &Format) -> Vec<LazItemType> {
+pub(crate) fn laz_items(format: &Format) -> Vec<LazItemType> {
     use LazItemType::{Byte, Byte14, GpsTime, Point10, Point14, RGB12, RGB14, RGBNIR14, WavePacket13, WavePacket14};
     let extra = (format.extra_bytes > 0).then_some(format.extra_bytes);
     let when = |there: bool, item| there.then_some(item);

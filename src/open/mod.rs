@@ -36,6 +36,10 @@ pub use crs::GeoReference;
 pub use error::OpenError;
 pub use frame::{Crs, Frame};
 pub use gdal_messages::{gdal_failures, listen_to_gdal};
+#[allow(unused_imports)]
+pub(crate) use las_header::{COPC_USER, LASZIP_RECORD, LasInput, MINOR_VERSION_AT, VariableRecord};
+#[allow(unused_imports)]
+pub(crate) use laz_chunks::laz_items;
 pub use reach::Reach;
 pub use scalar::Scalar;
 pub use surface::{MemorySurface, Surface};

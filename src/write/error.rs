@@ -1,5 +1,6 @@
 //! What can go wrong while results are written.
 
+use crate::open::OpenError;
 use crate::statistics::RasterError;
 use std::path::PathBuf;
 
@@ -107,6 +108,17 @@ pub enum WriteError {
     /// The grain-size raster cannot be laid out.
     #[error(transparent)]
     Raster(#[from] RasterError),
+    /// The input cloud cannot be read again.
+    #[error(transparent)]
+    Cloud(#[from] OpenError),
+    /// A point of the labelled cloud would be longer than LAS allows, or could not be described.
+    #[error("{path}: points of {bytes} bytes, as the input has them, leave no room for a described grain_id (65535 bytes in all)\nhelp: run without the labelled cloud, or drop extra dimensions of the input", path = path.display())]
+    CloudRecord {
+        /// The file.
+        path: PathBuf,
+        /// Bytes of a point of the input.
+        bytes: u16,
+    },
     /// The labelled mesh cannot number this many grains.
     #[error("{grains} grains: a labelled mesh numbers its grains with 32-bit integers, {most} at most\nhelp: run without the labelled mesh, or cut the survey", most = i32::MAX)]
     TooManyGrains {

@@ -13,14 +13,22 @@ mod atomic;
 pub mod columns;
 mod csv;
 mod error;
+#[allow(dead_code)]
+mod extra_bytes;
 mod gdal_calls;
 mod gdal_options;
 mod gdal_watch;
 mod geotiff;
 mod gpkg;
 mod json;
+#[allow(dead_code)]
+mod labelled_cloud;
+#[cfg(test)]
+mod labelled_cloud_tests;
 mod labelled_mesh;
 mod layers;
+#[allow(dead_code)]
+mod laz_stream;
 mod source;
 mod wkb;
 
