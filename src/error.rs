@@ -12,6 +12,7 @@ use crate::settings::SettingsError;
 use crate::statistics::RasterError;
 use crate::stitch::RecordError;
 use crate::store::StoreError;
+use crate::triangulate::DrapeError;
 use crate::write::WriteError;
 
 /// Why a run ended without a result.
@@ -24,6 +25,9 @@ pub enum Error {
     /// An input cannot be read.
     #[error(transparent)]
     Open(#[from] OpenError),
+    /// The cloud has no surface.
+    #[error(transparent)]
+    Drape(#[from] DrapeError),
     /// The survey cannot be indexed.
     #[error(transparent)]
     Index(#[from] IndexError),

@@ -5,6 +5,7 @@ use crate::index::{BuildRoom, disk_bytes};
 use crate::open::Reach;
 use crate::passes::Survey;
 use crate::settings::Settings;
+use crate::surfaces::triangles_to_expect;
 use crate::tile::TileMesh;
 
 /// Memory of the program itself, of GDAL and of buffers, bytes.
@@ -57,7 +58,7 @@ fn mebibytes(bytes: u64) -> u64 {
 /// Memory that is not free for tiles: the program, a bit for each vertex while the index is made, 16 bytes for
 /// each cell.
 pub fn fixed_bytes(reach: &Reach) -> u64 {
-    BASE_BYTES + reach.vertices() / 8 + reach.triangles() / 2
+    BASE_BYTES + reach.vertices() / 8 + triangles_to_expect(reach) / 2
 }
 
 /// The smallest memory budget with which a survey can be run, bytes.
@@ -67,7 +68,7 @@ pub fn least_bytes(reach: &Reach) -> u64 {
 
 /// The memory with which a survey is worked in one piece, bytes.
 pub fn whole_bytes(reach: &Reach) -> u64 {
-    least_bytes(reach).max(fixed_bytes(reach) + TileMesh::footprint_bytes(reach.triangles().min(LARGEST_CORE as u64)))
+    least_bytes(reach).max(fixed_bytes(reach) + TileMesh::footprint_bytes(triangles_to_expect(reach).min(LARGEST_CORE as u64)))
 }
 
 /// Memory in which the index is built.
@@ -88,7 +89,7 @@ pub fn room(reach: &Reach, memory: u64) -> Result<BuildRoom, ForecastError> {
 /// # Errors
 /// The disk has less.
 pub fn disk(reach: &Reach, room: BuildRoom, folder: &str, free: Option<u64>) -> Result<u64, ForecastError> {
-    let needed = disk_bytes(reach.vertices(), reach.triangles(), reach.full_color(), room.bytes);
+    let needed = disk_bytes(reach.vertices(), triangles_to_expect(reach), reach.full_color(), room.bytes);
     match free {
         Some(free) if free < needed => Err(ForecastError::Disk { folder: folder.to_owned(), needed, free }),
         _ => Ok(needed),

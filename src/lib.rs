@@ -3,8 +3,8 @@
 //! The modules are the river, in the order in which the data flows:
 //!
 //! ```text
-//!  open ──> index ──> tile ──> curvature ──> segment ──> measure ──> stitch ──> statistics ──> write
-//!                      └──────────── per tile, in the pipeline ────────────┘
+//!  open ──> triangulate ──> index ──> tile ──> curvature ──> segment ──> measure ──> stitch ──> statistics ──> write
+//!                                      └──────────── per tile, in the pipeline ────────────┘
 //! ```
 //!
 //! [`run`] is the page that shows all of it. A stage may use the stages above it, never those below;
@@ -17,6 +17,8 @@ pub mod settings;
 
 // The river. Blank lines keep the order.
 pub mod open;
+
+pub mod triangulate;
 
 pub mod index;
 
@@ -48,3 +50,4 @@ pub mod inspect;
 pub mod passes;
 pub mod resume;
 pub mod run;
+pub mod surfaces;

@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::forecast;
 use crate::index::{BuildRoom, Index};
 use crate::measure::Wanted;
-use crate::open::Reach;
+use crate::open::{Reach, Surface};
 use crate::passes::{Probe, Recipe, Survey};
 use crate::pipeline::{Budget, Control, Crew, LostJob, beside, memory_there_bytes, return_free_memory};
 use crate::progress::{Progress, Unit};
@@ -15,6 +15,8 @@ use crate::resume::{Curvature, ResumeError, WORK, WorkFolder, changes_since_fini
 use crate::segment::smallest_grain_area_m2;
 use crate::settings::{Instructions, Settings};
 use crate::statistics::RasterGrid;
+use crate::store::Shelf;
+use crate::surfaces::WholeSurface;
 use crate::stitch::{Catalogue, TileReport, stitch};
 use crate::tile::Plan;
 use crate::write::{OutputFolder, REPORT, Results, WholeMesh, WriteError, write_unnamed};
@@ -96,6 +98,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let mut work = WorkFolder::open(job.work.as_deref(), &job.out)?;
     let (pool, memory) = (pool(settings)?, memory_bytes(settings));
     let (threads, instructions) = (pool.current_num_threads(), instructions(settings)?);
+    let labelled = settings.output.labelled_mesh;
 
     // open
     let (reach, warnings) = pool.install(|| open(job, progress))?;
@@ -108,19 +111,29 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let room = forecast::room(&reach, memory)?;
     let budget = (room.bytes, forecast::fixed_bytes(&reach));
     let crew = Crew { pool, budget: Budget::strict(room.bytes), control: control.clone() };
-    let earlier = work.index(&reach)?;
+    let earlier = work.index(&reach, settings)?;
     let made = earlier.is_none();
+    let surface = |shelf: &Shelf| {
+        crew.pool.install(|| WholeSurface::of(&reach, settings, (shelf, room.bytes), progress))
+    };
+    let mut whole = None;
     let mut index = match earlier {
         Some(index) => index,
         None => {
             let disk = forecast::disk(&reach, room, &work.path().display().to_string(), work.free_bytes())?;
             progress.note(&format!("the index takes {} MiB in {}", disk >> 20, work.path().display()));
-            make_index(&reach, &work, room, &crew, progress)?
+            let surface = whole.insert(surface(&work.surface_shelf()?)?);
+            control.check()?;
+            let index = make_index(surface.surface(), &work, room, &crew, progress)?;
+            surface.figures().map_or(Ok(()), |figures| work.note_figures(&figures))?;
+            index
         }
     };
 
     // plan, and tile by tile: spacing; the disk takes the index meanwhile, also that of a run that is to stop
-    let keep = || if made { work.keep_index(&reach, &index) } else { Ok(()) };
+    // Labels go back onto the surface; nothing else needs it any more.
+    whole = whole.filter(|_| labelled);
+    let keep = || if made { work.keep_index(&reach, settings, &index) } else { Ok(()) };
     let (kept, planned) = beside(keep, || {
         control.check()?;
         check_outputs(&reach, &index, settings)?;
@@ -149,7 +162,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
 
     // tile by tile: segment and measure
     let outline_step_m = reach.frame().outline_step_m();
-    let wanted = Wanted { outline_step_m, triangle_ids: settings.output.labelled_mesh };
+    let wanted = Wanted { outline_step_m, triangle_ids: labelled };
     let recipe =
         Recipe { settings: &settings.segment, divergence: curvature.divergence(), wanted, usual_width_m: None };
     let probe = match plans.cores.divisible || plans.grains.tiles.len() > 1 {
@@ -181,26 +194,31 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let curvature_per_triangle = (owned > 0).then(|| loaded as f64 / owned as f64);
     facts["curvature_per_triangle"] = curvature_per_triangle.into();
     facts["identity"] = whole_identity(&reach, settings).into();
-    let mesh = WholeMesh::new(&reach);
+    facts["surface"] = serde_json::json!(work.figures());
+    if labelled && reach.is_cloud() && whole.is_none() {
+        whole = Some(surface(&work.surface_shelf()?)?);
+    }
+    let mesh = WholeMesh::new(&reach, whole.as_ref().and_then(WholeSurface::cloud));
+    let scale = index.scale.clone();
     let surveyed = index.triangles.occupied(&index.grid);
     let results = Results {
         frame: reach.frame(),
         settings,
-        scale: &index.scale,
+        scale: &scale,
         surveyed: &surveyed,
         catalogue: &catalogue,
         tiles: &tiles,
-        smallest_grain_area_m2: smallest_grain_area_m2(&index.scale, &settings.segment),
+        smallest_grain_area_m2: smallest_grain_area_m2(&scale, &settings.segment),
         facts: &facts,
         costs: &|| serde_json::json!(meter.costs()),
-        mesh: settings.output.labelled_mesh.then_some(&mesh),
+        mesh: labelled.then_some(&mesh),
     };
     let files = write(&folder, &results, progress, control)?;
     if lost.is_empty() {
         drop((index, curvature, findings));
         work.finish();
     }
-    let (triangles, costs) = (reach.triangles(), meter.costs());
+    let (triangles, costs) = (scale.triangles, meter.costs());
     Ok(Outcome { files, catalogue, lost, segmented_per_triangle, curvature_per_triangle, triangles, costs })
 }
 
@@ -238,16 +256,16 @@ fn memory_bytes(settings: &Settings) -> u64 {
 }
 
 fn make_index(
-    reach: &Reach,
+    surface: &dyn Surface,
     work: &WorkFolder,
     room: BuildRoom,
     crew: &Crew,
     progress: &dyn Progress,
 ) -> Result<Index, Error> {
-    progress.begin("index", reach.triangles(), Unit::Triangles);
-    let index = crew.pool.install(|| work.make_index(|shelf| Index::build(reach, shelf, room)))?;
+    progress.begin("index", surface.triangles(), Unit::Triangles);
+    let index = crew.pool.install(|| work.make_index(|shelf| Index::build(surface, shelf, room)))?;
     return_free_memory();
-    progress.advance(reach.triangles());
+    progress.advance(surface.triangles());
     progress.end();
     Ok(index)
 }

@@ -4,13 +4,14 @@
 use std::path::{Path, PathBuf};
 
 /// The river. A stage may use what stands before it.
-const RIVER: [&str; 9] = ["open", "index", "tile", "curvature", "segment", "measure", "stitch", "statistics", "write"];
+const RIVER: [&str; 10] =
+    ["open", "triangulate", "index", "tile", "curvature", "segment", "measure", "stitch", "statistics", "write"];
 /// What every stage may use.
 const SHARED: [&str; 2] = ["geometry", "settings"];
 /// What schedules, reports and keeps records; uses no stage.
 const MACHINERY: [&str; 3] = ["pipeline", "progress", "store"];
 /// Stages that touch the disk through `store`.
-const KEEPS: [&str; 3] = ["index", "tile", "write"];
+const KEEPS: [&str; 4] = ["triangulate", "index", "tile", "write"];
 const MOST_LINES: usize = 400;
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {

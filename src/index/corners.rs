@@ -3,10 +3,10 @@
 //! The new numbers of a block of the input's vertices are held in memory, and all triangles pass by. Where
 //! one block does not hold all vertices, the triangles pass once for each block, through a scratch column.
 
-use super::chunks::{over_chunks, over_chunks_then, pieces};
 use super::identity::{Id, Numbers};
 use super::shards::{Shard, holding};
 use crate::open::Surface;
+use crate::open::{over_chunks, over_chunks_then, pieces};
 use crate::store::{Scatter, Shelf, StoreError};
 use rayon::prelude::*;
 use std::ops::Range;

@@ -3,9 +3,9 @@
 //! Only what triangles use counts: a stray vertex far away must not stretch the grid.
 
 use super::cells::{CellGrid, Steps};
-use super::chunks::{over_chunks, over_chunks_then, pieces};
 use crate::geometry::DVec3;
 use crate::open::Surface;
+use crate::open::{over_chunks, over_chunks_then, pieces};
 use crate::store::StoreError;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};

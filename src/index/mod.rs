@@ -13,7 +13,6 @@
 //! triangles). On disk it takes about 35 bytes for each triangle.
 
 mod cells;
-mod chunks;
 mod colors;
 mod corners;
 mod ground;

@@ -1,6 +1,5 @@
 //! Vertices are sorted into cells, and by position within.
 
-use super::chunks::{over_chunks_then, pieces};
 use super::colors::{Color, Colors};
 use super::ground::Ground;
 use super::identity::{Id, Numbers};
@@ -8,6 +7,7 @@ use super::order::Sorter;
 use super::shards::{Shard, by_cell, of_rows};
 use crate::geometry::DVec3;
 use crate::open::Surface;
+use crate::open::{over_chunks_then, pieces};
 use crate::store::{Column, Element, Scatter, Shelf, StoreError};
 use rayon::prelude::*;
 use std::cmp::Ordering;

@@ -3,6 +3,7 @@
 use crate::forecast::{least_bytes, whole_bytes};
 use crate::index::disk_bytes;
 use crate::open::Reach;
+use crate::surfaces::triangles_to_expect;
 use serde::Serialize;
 
 /// Memory and disk of a run.
@@ -25,7 +26,7 @@ impl Needs {
             least_memory_bytes: least_bytes(reach),
             whole_memory_bytes: whole_bytes(reach),
             memory_there_bytes,
-            disk_bytes: disk_bytes(reach.vertices(), reach.triangles(), reach.full_color(), u64::MAX),
+            disk_bytes: disk_bytes(reach.vertices(), triangles_to_expect(reach), reach.full_color(), u64::MAX),
         }
     }
 }

@@ -56,6 +56,11 @@ pub enum OpenError {
          free some space there, or set TMPDIR to a folder with room for about the file's size"
     )]
     Scratch { path: String, folder: String, source: std::io::Error },
+    /// The triangles of a cloud cannot be read again.
+    #[error(
+        "the surface of the cloud cannot be mapped: {source}\nhelp: give the process more address space (ulimit -v)"
+    )]
+    Surface { source: std::io::Error },
     /// An element is declared twice.
     #[error(
         "{path}: the header declares element `{element}` twice\nhelp: export the mesh again with one `{element}` element"
@@ -69,12 +74,12 @@ pub enum OpenError {
     /// The file has no vertices.
     #[error("{path}: has 0 vertices\nhelp: the mesh is empty; check the export")]
     NoVertices { path: String },
-    /// The file is a point cloud.
+    /// Some files are meshes and some are point clouds.
     #[error(
-        "{path}: has {vertices} vertices but no faces: it is a point cloud, which this version does not read yet\n\
-         help: mesh it first, for instance with Poisson reconstruction in CloudCompare or MeshLab"
+        "{mesh} is a mesh and {cloud} a point cloud: they cannot be one survey, since a cloud gets a surface of its own\n\
+         help: run the meshes and the clouds apart from each other"
     )]
-    PointCloud { path: String, vertices: u64 },
+    MeshAndCloud { mesh: String, cloud: String },
     /// A property is missing.
     #[error(
         "{path}: element `{element}` has no property `{property}` (it has: {found})\nhelp: export the mesh again with \

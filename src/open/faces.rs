@@ -49,6 +49,12 @@ enum Flaw {
 }
 
 impl Faces {
+    /// Those of a point cloud.
+    pub(super) fn none() -> Faces {
+        let shape = Shape::Fixed { first_list: 0, stride: 0 };
+        Faces { count: 0, triangles: 0, length: Scalar::U8, index: Scalar::U32, shape }
+    }
+
     /// Finds and validates the faces, whose element starts at byte `start`, and the byte behind them.
     ///
     /// # Errors

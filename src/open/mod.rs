@@ -1,6 +1,8 @@
 //! Opening a survey: files become arrays in one frame. Knows formats and georeferencing, nothing else.
 
+mod chunks;
 mod crs;
+mod draped;
 mod error;
 mod faces;
 mod frame;
@@ -32,7 +34,9 @@ mod transcode;
 mod vertices;
 mod warning;
 
+pub(crate) use chunks::{over_chunks, over_chunks_then, pieces};
 pub use crs::GeoReference;
+pub use draped::DrapedCloud;
 pub use error::OpenError;
 pub use frame::{Crs, Frame};
 pub use gdal_messages::{gdal_failures, listen_to_gdal};

@@ -1,4 +1,4 @@
-//! PLY meshes.
+//! PLY meshes and point clouds.
 
 use super::error::OpenError;
 use super::faces::Faces;
@@ -11,7 +11,8 @@ use super::transcode::{Transcoded, is_needed, transcode};
 use super::vertices::Vertices;
 use ply_rs_bw::ply::Encoding;
 
-/// A validated PLY mesh: no later read of a vertex or triangle below the counts can fail.
+/// A validated PLY mesh, or a point cloud, which has no faces: no later read of a vertex or triangle below the counts
+/// can fail.
 #[derive(Debug)]
 pub(super) struct PlyMesh {
     /// The records: of the file itself, or of what it was transcoded to.
@@ -36,7 +37,7 @@ impl PlyMesh {
     /// Everything that [`OpenError`] says about PLY files.
     pub(super) fn open(path: &str, bytes: MappedFile, progress: &Progress<'_>) -> Result<PlyMesh, OpenError> {
         let header = PlyHeader::parse(path, &bytes)?;
-        check_is_mesh(path, &header)?;
+        check_has_vertices(path, &header)?;
         let fingerprint = Fingerprint::of(&bytes, bytes.modified_s());
         if !is_needed(&header) {
             return PlyMesh::records(path, (bytes, fingerprint), header, progress);
@@ -44,7 +45,7 @@ impl PlyMesh {
         let encoding = header.encoding;
         let source = Source { path, bytes: &bytes };
         let Transcoded { bytes, header, trailing_bytes } = transcode(source, &header, progress)?;
-        check_is_mesh(path, &header)?;
+        check_has_vertices(path, &header)?;
         let mesh = PlyMesh::records(path, (bytes, fingerprint), header, progress)?;
         Ok(PlyMesh { encoding, trailing_bytes, ..mesh })
     }
@@ -74,9 +75,8 @@ impl PlyMesh {
                 _ => locate(source, element, at, false, progress)?.1,
             };
         }
-        let (Some(mut vertices), Some(faces)) = (vertices, faces) else {
-            return Err(OpenError::NoVertices { path: path.to_owned() });
-        };
+        let Some(mut vertices) = vertices else { return Err(OpenError::NoVertices { path: path.to_owned() }) };
+        let faces = faces.unwrap_or_else(Faces::none);
         let bounds = vertices.validate(source, progress)?;
         let trailing_bytes = bytes.len() as u64 - at;
         let encoding = header.encoding;
@@ -100,23 +100,14 @@ impl PlyMesh {
     }
 }
 
-/// Whether the header declares vertices and faces at all: told before anything about encodings, which would
-/// send people off to convert a file that is no mesh.
-fn check_is_mesh(path: &str, header: &PlyHeader) -> Result<(), OpenError> {
+/// Whether the header declares vertices at all: told before anything about encodings, which would send people off to
+/// convert a file that is no survey.
+fn check_has_vertices(path: &str, header: &PlyHeader) -> Result<(), OpenError> {
     let path = || path.to_owned();
     let Some(vertex) = header.element("vertex") else {
         let found: Vec<&str> = header.elements.iter().map(|e| e.name.as_str()).collect();
         let found = if found.is_empty() { "nothing".to_owned() } else { found.join(", ") };
         return Err(OpenError::NoVertexElement { path: path(), found });
     };
-    if vertex.count == 0 {
-        return Err(OpenError::NoVertices { path: path() });
-    }
-    if header.element("face").is_some_and(|face| face.count > 0) {
-        return Ok(());
-    }
-    if header.element("tristrips").is_some_and(|strips| strips.count > 0) {
-        return Ok(());
-    }
-    Err(OpenError::PointCloud { path: path(), vertices: vertex.count })
+    if vertex.count == 0 { Err(OpenError::NoVertices { path: path() }) } else { Ok(()) }
 }

@@ -56,6 +56,7 @@ impl Reach {
     ) -> Result<(Reach, Vec<Warning>), OpenError> {
         let reference = GeoReference::from_setting(&input.crs)?;
         let files = open_files(paths, progress)?;
+        check_same_kind(&files)?;
         let bounds = joint_bounds(&files);
         let frame = make_frame(input, reference, &bounds);
         check_extent(&files, &frame, &bounds)?;
@@ -67,6 +68,11 @@ impl Reach {
         reach.check_precision(&edges_m)?;
         let warnings = reach.warnings(input, &edges_m);
         Ok((reach, warnings))
+    }
+
+    /// Whether the files are point clouds, which have vertices and no triangles.
+    pub fn is_cloud(&self) -> bool {
+        self.triangles() == 0
     }
 
     /// From input to local to map.
@@ -205,6 +211,16 @@ impl Reach {
         file.mesh.vertices.color_in(file.mesh.bytes(), vertex - file.first_vertex, full).unwrap_or_default()
     }
 
+    /// Whether a point of a cloud is noise or withheld.
+    ///
+    /// # Panics
+    /// Above the last vertex.
+    #[inline]
+    pub fn is_skipped(&self, vertex: u64) -> bool {
+        let file = self.file_of(vertex, |f| f.first_vertex);
+        file.mesh.vertices.is_skipped(file.mesh.bytes(), vertex - file.first_vertex)
+    }
+
     /// Lets go of all pages of the files: they are read again when they are needed.
     pub fn release(&self) {
         self.files.iter().for_each(|f| f.mesh.release());
@@ -318,6 +334,17 @@ fn open_files(paths: &[PathBuf], tell: &(dyn Fn(u64, u64) + Sync)) -> Result<Vec
         progress.reach(done);
     }
     Ok(files)
+}
+
+fn check_same_kind(files: &[SurveyFile]) -> Result<(), OpenError> {
+    let find = |cloud: bool| files.iter().find(|f| (f.triangles() == 0) == cloud);
+    match (find(false), find(true)) {
+        (Some(mesh), Some(cloud)) => {
+            let name = |file: &SurveyFile| file.path.display().to_string();
+            Err(OpenError::MeshAndCloud { mesh: name(mesh), cloud: name(cloud) })
+        }
+        _ => Ok(()),
+    }
 }
 
 fn joint_bounds(files: &[SurveyFile]) -> ([f64; 3], [f64; 3]) {

@@ -26,7 +26,8 @@ pub(super) fn is_needed(header: &PlyHeader) -> bool {
     };
     header.encoding != Encoding::BinaryLittleEndian
         || header.element("vertex").is_some_and(number_after_list)
-        || header.element("face").is_none_or(|face| face.count == 0) && header.element(STRIPS).is_some()
+        || header.element("face").is_none_or(|face| face.count == 0)
+            && header.element(STRIPS).is_some_and(|strips| strips.count > 0)
 }
 
 /// What a file became.

@@ -12,6 +12,8 @@ use std::ops::Range;
 const COLOR_NAMES: [[&str; 3]; 3] =
     [["red", "green", "blue"], ["diffuse_red", "diffuse_green", "diffuse_blue"], ["r", "g", "b"]];
 const AXES: [&str; 3] = ["x", "y", "z"];
+/// The byte of a decoded cloud that is not 0 for points that are to be left out.
+pub(super) const SKIPPED: &str = "gravelometer_skipped";
 
 /// A number of a vertex record.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -56,6 +58,8 @@ pub(super) struct Vertices {
     /// The numbers before the first list, which is all of them where there is none.
     pub(super) scalars: Vec<ScalarProperty>,
     scalars_bytes: usize,
+    /// Where a record says that it is to be left out.
+    skipped: Option<usize>,
 }
 
 /// What a look at every vertex gives.
@@ -108,6 +112,8 @@ impl Vertices {
         };
         let (color, color_refused) = find_color(element, &scalars);
         let (records, end) = locate(source, element, start, true, progress)?;
+        let is_mark = |p: &&ScalarProperty| p.name == SKIPPED && p.scalar == Scalar::U8;
+        let skipped = scalars.iter().find(is_mark).map(|p| p.offset);
         let vertices = Vertices {
             count: element.count,
             records,
@@ -117,6 +123,7 @@ impl Vertices {
             color_refused,
             scalars,
             scalars_bytes,
+            skipped,
         };
         Ok((vertices, end))
     }
@@ -246,6 +253,12 @@ impl Vertices {
             return Some(color.offsets.map(|at| f32::from(record[at])));
         }
         Some(color.offsets.map(|at| (color.scalar.number(&record[at..]) / color.full * full) as f32))
+    }
+
+    /// Whether a point is noise or withheld: only decoded clouds say so.
+    #[inline]
+    pub(super) fn is_skipped(&self, bytes: &[u8], vertex: u64) -> bool {
+        self.skipped.is_some_and(|offset| bytes[self.records.at(vertex) + offset] != 0)
     }
 
     /// The bytes of a vertex's numbers, as [`Vertices::scalars`] lists them.

@@ -8,7 +8,7 @@ use std::path::Path;
 
 /// Everything that the results depend on, as one line of text for the report of the run.
 pub fn whole_identity(reach: &Reach, settings: &Settings) -> String {
-    Identity::of_survey(reach).and_all(settings).text()
+    Identity::of_survey(reach, settings).and_all(settings).text()
 }
 
 /// What has changed since the run whose results are complete in `out`: nothing, if it was this very run. None where no
@@ -27,7 +27,7 @@ pub fn changes_since_finished(out: &Path, report: &str, reach: &Reach, settings:
     if !facts.get("lost_tiles")?.as_array()?.is_empty() {
         return None;
     }
-    let identity = Identity::of_survey(reach).and_all(settings);
+    let identity = Identity::of_survey(reach, settings).and_all(settings);
     // The same text is the same run; a number that is read again may be another in its last digit.
     Some(if identity.text() == earlier { Vec::new() } else { identity.changes_since(earlier) })
 }

@@ -21,7 +21,7 @@ pub struct Change {
 
 impl Identity {
     /// Of the surface: the index depends on nothing else.
-    pub(super) fn of_survey(reach: &Reach) -> Identity {
+    pub(super) fn of_survey(reach: &Reach, settings: &Settings) -> Identity {
         let mut names = Map::new();
         names.insert("program version".into(), env!("CARGO_PKG_VERSION").into());
         names.insert("number of inputs".into(), reach.files().len().into());
@@ -31,7 +31,11 @@ impl Identity {
         let frame = reach.frame();
         names.insert("unit of the input, metres".into(), frame.metres_per_input_unit.to_string().into());
         names.insert("origin, input units".into(), format!("{:?}", frame.origin_input).into());
-        Identity(names)
+        let mut identity = Identity(names);
+        if reach.is_cloud() {
+            identity.add("surface", serde_json::json!(settings.surface));
+        }
+        identity
     }
 
     /// With what the curvature depends on as well.

@@ -28,6 +28,7 @@ use crate::open::Reach;
 use crate::settings::Settings;
 use crate::store::{Ledger, Shelf, StoreError, fail_point};
 use crate::tile::CoreSize;
+use crate::triangulate::DrapeFigures;
 use identity::Identity;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -37,6 +38,8 @@ pub const WORK: &str = "gravelometer-work";
 const MARK: &str = "gravelometer-work.lock";
 const INDEX: &str = "index";
 const CURVATURE: &str = "curvature";
+/// What became of the points of a cloud, in the folder of its index.
+const FIGURES: &str = "surface.json";
 const GRAINS: &str = "grains";
 
 /// Where a run keeps what it needs again.
@@ -164,7 +167,7 @@ impl WorkFolder {
     /// What is resumed was another run, or the disk says no.
     pub fn begin(&mut self, reach: &Reach, settings: &Settings, resume: bool) -> Result<Findings, Error> {
         let outline_step_m = reach.frame().outline_step_m();
-        let identity = Identity::of_survey(reach).and_curvature(settings).and_grains(settings, outline_step_m);
+        let identity = Identity::of_survey(reach, settings).and_curvature(settings).and_grains(settings, outline_step_m);
         if !resume {
             // What is not resumed must not be found later.
             self.shelf.remove(GRAINS);
@@ -186,8 +189,30 @@ impl WorkFolder {
     ///
     /// # Errors
     /// The folder cannot be made.
-    pub fn index(&self, reach: &Reach) -> Result<Option<Index>, Error> {
-        Ok(Index::open(&self.shelf.inner(INDEX)?, &Identity::of_survey(reach).text()))
+    pub fn index(&self, reach: &Reach, settings: &Settings) -> Result<Option<Index>, Error> {
+        Ok(Index::open(&self.shelf.inner(INDEX)?, &Identity::of_survey(reach, settings).text()))
+    }
+
+    /// Where the surface of a cloud is made.
+    ///
+    /// # Errors
+    /// The folder cannot be made.
+    pub fn surface_shelf(&self) -> Result<Shelf, StoreError> {
+        self.shelf.inner(INDEX)
+    }
+
+    /// Notes what became of the points of a cloud, for runs that use its index again.
+    ///
+    /// # Errors
+    /// The disk says no.
+    pub fn note_figures(&self, figures: &DrapeFigures) -> Result<(), StoreError> {
+        self.shelf.inner(INDEX)?.put(FIGURES, serde_json::json!(figures).to_string().as_bytes())
+    }
+
+    /// What became of the points of the cloud that was indexed.
+    pub fn figures(&self) -> Option<DrapeFigures> {
+        let noted = self.shelf.inner(INDEX).ok()?.get(FIGURES)?;
+        serde_json::from_slice(&noted).ok()
     }
 
     /// Makes the index of the survey.
@@ -204,8 +229,8 @@ impl WorkFolder {
     ///
     /// # Errors
     /// The disk says no.
-    pub fn keep_index(&self, reach: &Reach, index: &Index) -> Result<(), StoreError> {
-        let keep = |shelf: &Shelf| index.keep(shelf, &Identity::of_survey(reach).text());
+    pub fn keep_index(&self, reach: &Reach, settings: &Settings, index: &Index) -> Result<(), StoreError> {
+        let keep = |shelf: &Shelf| index.keep(shelf, &Identity::of_survey(reach, settings).text());
         self.shelf.inner(INDEX).and_then(|shelf| keep(&shelf))
     }
 
@@ -220,7 +245,7 @@ impl WorkFolder {
     /// # Errors
     /// The disk says no.
     pub fn curvature(&self, reach: &Reach, index: &Index, settings: &Settings) -> Result<Curvature, Error> {
-        let identity = Identity::of_survey(reach).and_curvature(settings).text();
+        let identity = Identity::of_survey(reach, settings).and_curvature(settings).text();
         Ok(Curvature::open(&self.shelf.inner(CURVATURE)?, &identity, index)?)
     }
 

@@ -124,6 +124,19 @@ impl Settings {
             s.dilation_iterations <= 1000,
             "must be at most 1000 rings",
         )?;
+        let surface = &self.surface;
+        range(
+            "surface.gap_spacings",
+            surface.gap_spacings,
+            (1.0..=20.0).contains(&surface.gap_spacings),
+            "must lie in 1 to 20",
+        )?;
+        range(
+            "surface.steepest_deg",
+            surface.steepest_deg,
+            (45.0..=90.0).contains(&surface.steepest_deg),
+            "must lie in 45 to 90",
+        )?;
         let c = &self.curvature;
         range("curvature.neighbours", c.neighbours, (1..=256).contains(&c.neighbours), "must lie in 1 to 256")?;
         range(

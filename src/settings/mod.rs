@@ -15,6 +15,8 @@ use serde::{Deserialize, Serialize};
 pub struct Settings {
     /// What the input's coordinates mean.
     pub input: InputSettings,
+    /// How a point cloud gets its surface.
+    pub surface: SurfaceSettings,
     /// How curvature is computed.
     pub curvature: CurvatureSettings,
     /// What makes a grain.
@@ -54,6 +56,24 @@ pub struct InputSettings {
     pub crs: String,
     /// East, north and up shift added to the coordinates to reach the CRS, in units of the CRS.
     pub offset: [f64; 3],
+}
+
+/// How a point cloud gets its surface. Meshes have one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SurfaceSettings {
+    /// Radius of the widest empty circle that a triangle may span, in spacings of the points around it, 1 to 20. Wider
+    /// gaps stay open.
+    pub gap_spacings: f64,
+    /// A point is left out if another one, near it in plan, is above it and more steeply so than this, degrees from the
+    /// horizontal, 45 to 90: what is under overhangs. 90 leaves out none.
+    pub steepest_deg: f64,
+}
+
+impl Default for SurfaceSettings {
+    fn default() -> Self {
+        SurfaceSettings { gap_spacings: 3.0, steepest_deg: 80.0 }
+    }
 }
 
 /// How curvature is computed (Rheinwalt et al. 2025, eq. 1 and 2).

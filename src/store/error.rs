@@ -106,7 +106,7 @@ pub enum StoreError {
 
 impl StoreError {
     /// The error for what the system says; a full disk is told apart.
-    pub(super) fn io(path: &Path, action: &'static str, source: io::Error) -> StoreError {
+    pub(crate) fn io(path: &Path, action: &'static str, source: io::Error) -> StoreError {
         let path = path.to_owned();
         match source.kind() {
             io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => StoreError::Full { path, action, source },

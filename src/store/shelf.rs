@@ -139,7 +139,7 @@ impl Shelf {
     }
 
     /// A file that nobody will find again.
-    pub(super) fn scratch(&self, name: &str) -> Result<(File, PathBuf), StoreError> {
+    pub fn scratch(&self, name: &str) -> Result<(File, PathBuf), StoreError> {
         let path = self.path(&format!("{name}.scratch"));
         let made = OpenOptions::new().read(true).write(true).create(true).truncate(true).open(&path);
         let file = made.map_err(|e| StoreError::io(&path, "make the file", e))?;

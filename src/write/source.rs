@@ -1,20 +1,22 @@
 //! A survey as the labelled mesh reads it again: file by file, record by record.
 
 use super::MeshSource;
-use crate::open::{Reach, ScalarProperty, SurveyFile};
+use crate::open::{DrapedCloud, Reach, ScalarProperty, Surface, SurveyFile};
 
 /// A survey with the vertex properties that all of its files have, with the same type, in the order of
 /// the first file.
 pub struct WholeMesh<'a> {
     reach: &'a Reach,
+    /// The surface that a cloud got.
+    cloud: Option<&'a DrapedCloud<'a>>,
     properties: Vec<&'a ScalarProperty>,
     /// For each file, where each of the properties lies in a record: offset and bytes.
     places: Vec<Vec<(usize, usize)>>,
 }
 
 impl<'a> WholeMesh<'a> {
-    /// A survey ready to be read again.
-    pub fn new(reach: &'a Reach) -> WholeMesh<'a> {
+    /// A survey ready to be read again: of clouds, with the surface that they got.
+    pub fn new(reach: &'a Reach, cloud: Option<&'a DrapedCloud<'a>>) -> WholeMesh<'a> {
         let find = |file: &'a SurveyFile, wanted: &ScalarProperty| {
             file.vertex_properties().iter().find(|p| p.name == wanted.name && p.scalar == wanted.scalar)
         };
@@ -28,7 +30,7 @@ impl<'a> WholeMesh<'a> {
             .iter()
             .map(|file| properties.iter().filter_map(|p| find(file, p).map(place)).collect())
             .collect();
-        WholeMesh { reach, properties, places }
+        WholeMesh { reach, cloud, properties, places }
     }
 
     /// The file that holds an element, by the first number of each file.
@@ -42,7 +44,7 @@ impl MeshSource for WholeMesh<'_> {
         self.reach.vertices()
     }
     fn faces(&self) -> u64 {
-        self.reach.faces()
+        self.cloud.map_or_else(|| self.reach.faces(), |cloud| cloud.triangles())
     }
     fn vertex_properties(&self) -> Vec<(String, &'static str)> {
         self.properties.iter().map(|p| (p.name.clone(), p.scalar.ply_name())).collect()
@@ -56,13 +58,17 @@ impl MeshSource for WholeMesh<'_> {
         }
     }
     fn face_corners(&self, face: u64, out: &mut Vec<u64>) {
+        if let Some(cloud) = self.cloud {
+            out.extend(cloud.triangle(face));
+            return;
+        }
         let file = &self.reach.files()[self.file_with(face, SurveyFile::first_face)];
         out.extend(file.face_corners(face - file.first_face()).map(|v| v + file.first_vertex()));
     }
     fn face_of(&self, triangle: u64) -> u64 {
-        self.reach.face_of(triangle)
+        if self.cloud.is_some() { triangle } else { self.reach.face_of(triangle) }
     }
     fn triangles(&self) -> u64 {
-        self.reach.triangles()
+        self.cloud.map_or_else(|| self.reach.triangles(), |cloud| cloud.triangles())
     }
 }

@@ -1,7 +1,6 @@
 //! Sequential passes over a survey, a chunk at a time, on all threads of the pool.
 
-use crate::open::Surface;
-use crate::store::StoreError;
+use super::Surface;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -16,23 +15,23 @@ const RELEASE: u64 = 32;
 ///
 /// Chunks come in no particular order, so `work` must not care. What was read of the surface is let go as
 /// the pass goes on, but for what the next pass may read first.
-pub(super) fn over_chunks<S>(
+pub(crate) fn over_chunks<S, E: Send>(
     surface: &dyn Surface,
     n: u64,
-    start: impl Fn() -> Result<S, StoreError> + Sync,
-    work: impl Fn(&mut S, Range<u64>) -> Result<(), StoreError> + Sync,
-) -> Result<(), StoreError> {
+    start: impl Fn() -> Result<S, E> + Sync,
+    work: impl Fn(&mut S, Range<u64>) -> Result<(), E> + Sync,
+) -> Result<(), E> {
     over_chunks_then(surface, n, start, work, |_| Ok(()))
 }
 
 /// [`over_chunks`], with an `end` for the state of each thread.
-pub(super) fn over_chunks_then<S>(
+pub(crate) fn over_chunks_then<S, E: Send>(
     surface: &dyn Surface,
     n: u64,
-    start: impl Fn() -> Result<S, StoreError> + Sync,
-    work: impl Fn(&mut S, Range<u64>) -> Result<(), StoreError> + Sync,
-    end: impl Fn(S) -> Result<(), StoreError> + Sync,
-) -> Result<(), StoreError> {
+    start: impl Fn() -> Result<S, E> + Sync,
+    work: impl Fn(&mut S, Range<u64>) -> Result<(), E> + Sync,
+    end: impl Fn(S) -> Result<(), E> + Sync,
+) -> Result<(), E> {
     let next = AtomicU64::new(0);
     let done = rayon::broadcast(|_| {
         let mut state = start()?;
@@ -51,6 +50,6 @@ pub(super) fn over_chunks_then<S>(
 }
 
 /// Cuts what a thread works into pieces that are read at a time.
-pub(super) fn pieces(range: Range<u64>) -> impl Iterator<Item = Range<u64>> {
+pub(crate) fn pieces(range: Range<u64>) -> impl Iterator<Item = Range<u64>> {
     range.clone().step_by(PIECE as usize).map(move |first| first..(first + PIECE).min(range.end))
 }

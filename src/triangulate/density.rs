@@ -1,0 +1,183 @@
+//! How far apart points lie, place by place.
+//!
+//! Points are counted in square cells, and cells four by four in larger ones, and so on. The spacing at a place is that
+//! of evenly spread points in the smallest of these squares that holds enough of them. It depends on the survey only.
+
+use super::DrapeError;
+use crate::geometry::DVec3;
+use crate::open::{Surface, over_chunks_then, pieces};
+use std::ops::Range;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+/// Points of an average cell, if the survey filled its box.
+const POINTS_PER_CELL: u64 = 8;
+/// Cells, at most: 45 MB with the larger squares.
+const MOST_CELLS: f64 = 8_388_608.0;
+/// Points by which a square is judged: their number then is right to a fifth where they are strewn at random.
+const ENOUGH: u32 = 32;
+/// The spacing is nowhere taken for more than so many times that of the whole survey: stray points far from one another
+/// are no surface.
+const WIDEST: f64 = 8.0;
+
+/// Numbers of points, in squares of all sizes.
+pub(super) struct Density {
+    min: [f64; 2],
+    cell_m: f64,
+    /// From the smallest squares to the largest.
+    levels: Vec<Level>,
+    /// Spacing of evenly spread points where there are any, metres.
+    pub(super) typical_m: f64,
+}
+
+struct Level {
+    columns: u32,
+    count: Vec<u32>,
+}
+
+/// Whether a point is used, by its number in the cloud.
+pub type Keep<'a> = &'a (dyn Fn(u64) -> bool + Sync);
+
+impl Density {
+    /// Counts the points that are kept, in two passes.
+    ///
+    /// # Errors
+    /// No point is kept, or all are at one place in plan.
+    pub(super) fn of(cloud: &dyn Surface, keep: Keep) -> Result<(Density, u64), DrapeError> {
+        let (min, max, kept) = bounds(cloud, keep);
+        let (width, height) = ((max[0] - min[0]).max(1e-9), (max[1] - min[1]).max(1e-9));
+        if kept < 3 || (max[0] <= min[0] && max[1] <= min[1]) {
+            return Err(DrapeError::TooFew { points: cloud.vertices(), kept });
+        }
+        let most = ((kept / POINTS_PER_CELL) as f64).clamp(1.0, MOST_CELLS);
+        let mut cell_m = (width * height / most).sqrt().max(width.max(height) / most);
+        while (width / cell_m + 1.0).floor() * (height / cell_m + 1.0).floor() > most.max(4.0) {
+            cell_m *= 1.125;
+        }
+        let (columns, rows) = ((width / cell_m) as u32 + 1, (height / cell_m) as u32 + 1);
+        let count: Vec<AtomicU32> = (0..columns as usize * rows as usize).map(|_| AtomicU32::new(0)).collect();
+        let mut density = Density { min, cell_m, levels: Vec::new(), typical_m: 0.0 };
+        density.levels.push(Level { columns, count: Vec::new() });
+        each_kept(cloud, keep, || (), |(), p| {
+            let [column, row] = density.cell(p, rows);
+            count[row as usize * columns as usize + column as usize].fetch_add(1, Ordering::Relaxed);
+        }, |()| ());
+        density.levels[0].count = count.into_iter().map(AtomicU32::into_inner).collect();
+        density.gather();
+        let occupied = density.levels[0].count.iter().filter(|&&n| n > 0).count();
+        // Cells on the border are filled in part: what lies around a narrow survey is not its own.
+        density.typical_m = (occupied as f64 * cell_m * cell_m / kept as f64).sqrt();
+        Ok((density, kept))
+    }
+
+    /// Makes the larger squares of the smaller.
+    fn gather(&mut self) {
+        loop {
+            let small = &self.levels[self.levels.len() - 1];
+            let rows = small.count.len() as u32 / small.columns;
+            if small.columns == 1 && rows == 1 {
+                return;
+            }
+            let columns = small.columns.div_ceil(2);
+            let mut count = vec![0u32; columns as usize * rows.div_ceil(2) as usize];
+            for (i, &n) in small.count.iter().enumerate() {
+                let (column, row) = (i % small.columns as usize, i / small.columns as usize);
+                let to = &mut count[row / 2 * columns as usize + column / 2];
+                *to = to.saturating_add(n);
+            }
+            self.levels.push(Level { columns, count });
+        }
+    }
+
+    /// Columns and rows of cells.
+    pub(super) fn size(&self) -> [u32; 2] {
+        [self.levels[0].columns, self.levels[0].count.len() as u32 / self.levels[0].columns]
+    }
+
+    /// Column and row of the cell of a point.
+    #[inline]
+    pub(super) fn cell_of(&self, p: DVec3) -> [u32; 2] {
+        self.cell(p, self.size()[1])
+    }
+
+    #[inline]
+    fn cell(&self, p: DVec3, rows: u32) -> [u32; 2] {
+        let index = |x: f64, axis: usize, n: u32| (((x - self.min[axis]) / self.cell_m).max(0.0) as u32).min(n - 1);
+        [index(p.x, 0, self.levels[0].columns), index(p.y, 1, rows)]
+    }
+
+    /// Points of a cell.
+    pub(super) fn count(&self, [column, row]: [u32; 2]) -> u32 {
+        self.levels[0].count[row as usize * self.levels[0].columns as usize + column as usize]
+    }
+
+    /// Lowest and highest corner of a block of cells, metres. Cells at the border hold what lies beyond them.
+    pub(super) fn sides(&self, columns: &Range<u32>, rows: &Range<u32>) -> [[f64; 2]; 2] {
+        let at = |axis: usize, cell: u32| self.min[axis] + f64::from(cell) * self.cell_m;
+        [[at(0, columns.start), at(1, rows.start)], [at(0, columns.end), at(1, rows.end)]]
+    }
+
+    /// Spacing of the points around a cell, metres.
+    pub(super) fn spacing_m(&self, [column, row]: [u32; 2]) -> f64 {
+        let widest_m = WIDEST * self.typical_m;
+        for (up, level) in self.levels.iter().enumerate() {
+            let n = level.count[(row >> up) as usize * level.columns as usize + (column >> up) as usize];
+            if n >= ENOUGH || up + 1 == self.levels.len() {
+                let side_m = self.cell_m * (1u64 << up) as f64;
+                return (side_m * side_m / f64::from(n.max(1))).sqrt().min(widest_m);
+            }
+        }
+        widest_m
+    }
+}
+
+/// Goes over all points that are kept, on all threads; `end` gets the state of each.
+pub(super) fn each_kept<S>(
+    cloud: &dyn Surface,
+    keep: Keep,
+    start: impl Fn() -> S + Sync,
+    look: impl Fn(&mut S, DVec3) + Sync,
+    end: impl Fn(S) + Sync,
+) {
+    let passed: Result<(), std::convert::Infallible> = over_chunks_then(
+        cloud,
+        cloud.vertices(),
+        || Ok((start(), Vec::new())),
+        |(state, positions), range| {
+            for piece in pieces(range) {
+                cloud.positions(piece.clone(), positions);
+                piece.zip(&*positions).filter(|&(i, _)| keep(i)).for_each(|(_, &p)| look(state, p));
+            }
+            Ok(())
+        },
+        |(state, _)| {
+            end(state);
+            Ok(())
+        },
+    );
+    match passed {
+        Ok(()) => (),
+    }
+}
+
+/// Lowest and highest place in plan of the points that are kept, metres, and how many there are.
+fn bounds(cloud: &dyn Surface, keep: Keep) -> ([f64; 2], [f64; 2], u64) {
+    let nothing = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2], 0u64);
+    let whole = Mutex::new(nothing);
+    each_kept(
+        cloud,
+        keep,
+        || nothing,
+        |(min, max, kept), p| {
+            (*min, *max) = ([min[0].min(p.x), min[1].min(p.y)], [max[0].max(p.x), max[1].max(p.y)]);
+            *kept += 1;
+        },
+        |(min, max, kept)| {
+            let mut all = whole.lock().unwrap_or_else(PoisonError::into_inner);
+            all.0 = [all.0[0].min(min[0]), all.0[1].min(min[1])];
+            all.1 = [all.1[0].max(max[0]), all.1[1].max(max[1])];
+            all.2 += kept;
+        },
+    );
+    whole.into_inner().unwrap_or_else(PoisonError::into_inner)
+}
