@@ -68,7 +68,8 @@ pub fn least_bytes(reach: &Reach) -> u64 {
 
 /// The memory with which a survey is worked in one piece, bytes.
 pub fn whole_bytes(reach: &Reach) -> u64 {
-    least_bytes(reach).max(fixed_bytes(reach) + TileMesh::footprint_bytes(triangles_to_expect(reach).min(LARGEST_CORE as u64)))
+    least_bytes(reach)
+        .max(fixed_bytes(reach) + TileMesh::footprint_bytes(triangles_to_expect(reach).min(LARGEST_CORE as u64)))
 }
 
 /// Memory in which the index is built.

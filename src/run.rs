@@ -15,9 +15,9 @@ use crate::resume::{Curvature, ResumeError, WORK, WorkFolder, changes_since_fini
 use crate::segment::smallest_grain_area_m2;
 use crate::settings::{Instructions, Settings};
 use crate::statistics::RasterGrid;
+use crate::stitch::{Catalogue, TileReport, stitch};
 use crate::store::Shelf;
 use crate::surfaces::WholeSurface;
-use crate::stitch::{Catalogue, TileReport, stitch};
 use crate::tile::Plan;
 use crate::write::{OutputFolder, REPORT, Results, WholeMesh, WriteError, write_unnamed};
 use std::path::{Path, PathBuf};
@@ -113,9 +113,8 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let crew = Crew { pool, budget: Budget::strict(room.bytes), control: control.clone() };
     let earlier = work.index(&reach, settings)?;
     let made = earlier.is_none();
-    let surface = |shelf: &Shelf| {
-        crew.pool.install(|| WholeSurface::of(&reach, settings, (shelf, room.bytes), progress))
-    };
+    let surface =
+        |shelf: &Shelf| crew.pool.install(|| WholeSurface::of(&reach, settings, (shelf, room.bytes), progress));
     let mut whole = None;
     let mut index = match earlier {
         Some(index) => index,

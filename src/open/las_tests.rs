@@ -6,11 +6,11 @@ use super::mapped::MappedFile;
 use super::progress::Progress;
 use super::vertices::Vertices;
 use super::{OpenError, Warning};
+use crate::open::records::Source;
 use las::point::{Classification, Format};
 use las::{Builder, Color, Point, Vlr, Writer};
 use proptest::prelude::*;
 use std::io::Cursor;
-use crate::open::records::Source;
 use std::path::{Path, PathBuf};
 
 /// The shared data's directory, or a printed reason to skip.
@@ -167,9 +167,11 @@ fn made(minor: u8, format: u8, points: u32, color: impl Fn(u32) -> u16, vlrs: Ve
                 x: (t * 0.1).sin() * 10.0,
                 y: t * 0.01,
                 z: -t,
-                classification: Classification::new([2, 7, 1, 18][i as usize % 4] % if format.is_extended { 32 } else { 18 })
-                    .expect("class"),
-                is_withheld: i % 5 == 0,
+                classification: Classification::new(
+                    [2, 7, 1, 18][i as usize % 4] % if format.is_extended { 32 } else { 18 },
+                )
+                .expect("class"),
+                is_withheld: i.is_multiple_of(5),
                 return_number: 1,
                 number_of_returns: 1,
                 gps_time: format.has_gps_time.then_some(t),
@@ -219,8 +221,10 @@ fn colours_are_kept_as_narrow_as_they_are_even_where_the_first_points_mislead() 
 fn noise_and_withheld_points_are_marked() {
     for (minor, format, classes) in [(2, 1, [7, 0]), (4, 6, [7, 18]), (4, LAZ_7, [7, 18])] {
         let points = read_bytes(&made(minor, format, 1000, |_| 9, Vec::new())).unwrap_or_else(|e| panic!("{e}"));
-        let noise = |i: &usize| classes.contains(&([2, 7, 1, if minor == 4 { 18 } else { 0 }][i % 4])) && classes[i % 4 / 2] != 0;
-        let withheld = |i: &usize| i % 5 == 0;
+        let noise = |i: &usize| {
+            classes.contains(&([2, 7, 1, if minor == 4 { 18 } else { 0 }][i % 4])) && classes[i % 4 / 2] != 0
+        };
+        let withheld = |i: &usize| i.is_multiple_of(5);
         let count = |of: &dyn Fn(&usize) -> bool| (0..1000).filter(of).count() as u64;
         assert_eq!(points.noise, count(&noise), "{}", points.format);
         assert_eq!(points.withheld, 200);
@@ -241,7 +245,8 @@ fn keys(entries: &[[u16; 4]]) -> Vlr {
 #[test]
 fn the_crs_is_what_the_file_states() {
     let crs = |vlrs| read_bytes(&made(2, 1, 3, |_| 0, vlrs)).unwrap_or_else(|e| panic!("{e}")).crs;
-    let stated = |definition: &str, height_unit_m| CloudCrs::Stated { definition: definition.to_owned(), height_unit_m };
+    let stated =
+        |definition: &str, height_unit_m| CloudCrs::Stated { definition: definition.to_owned(), height_unit_m };
     assert_eq!(crs(Vec::new()), CloudCrs::Unstated);
     assert_eq!(crs(vec![keys(&[[1024, 0, 1, 1], [3072, 0, 1, 2193]])]), stated("EPSG:2193", None));
     assert_eq!(crs(vec![keys(&[[3072, 0, 1, 2193], [4099, 0, 1, 9003]])]), stated("EPSG:2193", Some(1200.0 / 3937.0)));
@@ -331,8 +336,15 @@ fn victims() -> Vec<Vec<u8>> {
         made(4, LAZ_7, 300, |i| i as u16, Vec::new()),
     ];
     if let Some(folder) = shared("formats/las") {
-        let names = ["lasrs_autzen.copc.laz", "lasrs_autzen.laz", "loadersgl_pdrf7-v4-1.4.laz", "loadersgl_pdrf5-1.3.laz",
-            "loadersgl_pdrf10-1.5.laz", "lasrs_extrabytes.laz", "loadersgl_points-1.4.las"];
+        let names = [
+            "lasrs_autzen.copc.laz",
+            "lasrs_autzen.laz",
+            "loadersgl_pdrf7-v4-1.4.laz",
+            "loadersgl_pdrf5-1.3.laz",
+            "loadersgl_pdrf10-1.5.laz",
+            "lasrs_extrabytes.laz",
+            "loadersgl_points-1.4.las",
+        ];
         all.extend(names.map(|name| std::fs::read(folder.join(name)).expect("sample")));
     }
     all
@@ -374,7 +386,12 @@ fn speed_for_now() {
             for _ in 0..2 {
                 let start = std::time::Instant::now();
                 let points = read(Path::new(name)).expect("big");
-                println!("SPEED {name} {:?} {} {}", start.elapsed(), points.header.elements[0].count, kind_of_colors(&points));
+                println!(
+                    "SPEED {name} {:?} {} {}",
+                    start.elapsed(),
+                    points.header.elements[0].count,
+                    kind_of_colors(&points)
+                );
             }
         }
     }

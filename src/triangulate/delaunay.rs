@@ -30,10 +30,8 @@ impl HasPosition for Numbered {
 /// The triangulation of points that are sorted by place in plan, no two at one: triples of their numbers, seen from
 /// above counter-clockwise, the first the lowest.
 pub(super) fn triangles(sites: &[Site]) -> Result<Vec<[u32; 3]>, spade::InsertionError> {
-    let numbered = |(number, site): (u32, &Site)| Numbered {
-        at: mitigate_underflow(Point2::new(site.at.x, site.at.y)),
-        number,
-    };
+    let numbered =
+        |(number, site): (u32, &Site)| Numbered { at: mitigate_underflow(Point2::new(site.at.x, site.at.y)), number };
     let mesh = DelaunayTriangulation::<Numbered>::bulk_load((0..).zip(sites).map(numbered).collect())?;
     let corners: Vec<[u32; 3]> =
         mesh.inner_faces().map(|face| first_first(face.vertices().map(|v| v.data().number))).collect();

@@ -58,10 +58,16 @@ impl Density {
         let count: Vec<AtomicU32> = (0..columns as usize * rows as usize).map(|_| AtomicU32::new(0)).collect();
         let mut density = Density { min, cell_m, levels: Vec::new(), typical_m: 0.0 };
         density.levels.push(Level { columns, count: Vec::new() });
-        each_kept(cloud, keep, || (), |(), p| {
-            let [column, row] = density.cell(p, rows);
-            count[row as usize * columns as usize + column as usize].fetch_add(1, Ordering::Relaxed);
-        }, |()| ());
+        each_kept(
+            cloud,
+            keep,
+            || (),
+            |(), p| {
+                let [column, row] = density.cell(p, rows);
+                count[row as usize * columns as usize + column as usize].fetch_add(1, Ordering::Relaxed);
+            },
+            |()| (),
+        );
         density.levels[0].count = count.into_iter().map(AtomicU32::into_inner).collect();
         density.gather();
         let occupied = density.levels[0].count.iter().filter(|&&n| n > 0).count();

@@ -138,10 +138,8 @@ pub fn drape(
     (shelf, room): (&Shelf, u64),
 ) -> Result<Draped, DrapeError> {
     let (density, kept) = Density::of(cloud, keep)?;
-    let cover = Cover {
-        reach_m: COVER_SPACINGS * density.typical_m,
-        steepness: settings.steepest_deg.to_radians().tan(),
-    };
+    let cover =
+        Cover { reach_m: COVER_SPACINGS * density.typical_m, steepness: settings.steepest_deg.to_radians().tan() };
     // A circle through a point of the block, and what hides a point within the circle.
     let halo_m = |spacing_m: f64| 2.0 * settings.gap_spacings * spacing_m + cover.reach_m;
     let blocks = Blocks::cut(&density, halo_m);
@@ -233,13 +231,11 @@ fn piece(
     let hidden = from_above(&mut sites, cover);
     let (same_place, hidden) = (here(&same_place), here(&hidden));
     let all = triangles(&sites).map_err(|e| DrapeError::Coordinates { message: e.to_string() })?;
-    let limit_m: Vec<f64> =
-        sites.iter().map(|s| gap_spacings * density.spacing_m(density.cell_of(s.at))).collect();
+    let limit_m: Vec<f64> = sites.iter().map(|s| gap_spacings * density.spacing_m(density.cell_of(s.at))).collect();
     let is_ours = |corners: &[u32; 3]| {
         let [a, b, c] = corners.map(|v| v as usize);
         let limit_m = limit_m[a].min(limit_m[b]).min(limit_m[c]);
-        block.holds(density.cell_of(sites[a].at))
-            && circle_radius_m([&sites[a], &sites[b], &sites[c]]) <= limit_m
+        block.holds(density.cell_of(sites[a].at)) && circle_radius_m([&sites[a], &sites[b], &sites[c]]) <= limit_m
     };
     let mut triangles: Vec<[u32; 3]> = all.into_iter().filter(is_ours).collect();
     // By place, so that the numbers of triangles are the same in every run.

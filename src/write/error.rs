@@ -110,7 +110,7 @@ pub enum WriteError {
     Raster(#[from] RasterError),
     /// The input cloud cannot be read again.
     #[error(transparent)]
-    Cloud(#[from] OpenError),
+    Cloud(Box<OpenError>),
     /// A point of the labelled cloud would be longer than LAS allows, or could not be described.
     #[error("{path}: points of {bytes} bytes, as the input has them, leave no room for a described grain_id (65535 bytes in all)\nhelp: run without the labelled cloud, or drop extra dimensions of the input", path = path.display())]
     CloudRecord {
@@ -201,6 +201,12 @@ pub enum WriteError {
         /// Bytes of the record.
         found: usize,
     },
+}
+
+impl From<OpenError> for WriteError {
+    fn from(error: OpenError) -> WriteError {
+        WriteError::Cloud(Box::new(error))
+    }
 }
 
 fn found(ours: &[String], others: usize) -> String {

@@ -61,8 +61,9 @@ impl<'a> LazStream<'a> {
     pub(super) fn begin(file: &'a Pending, declared: Declared<'_>) -> Result<LazStream<'a>, WriteError> {
         let Declared { mut header, minor, mut format, records, described } = declared;
         let failed = |source| file.error("write the labelled cloud", source);
-        let too_long = || WriteError::CloudRecord { path: file.target.clone(), bytes: header.point_data_record_length };
-        let record_bytes = header.point_data_record_length.checked_add(LABEL_BYTES).ok_or_else(too_long)?;
+        let bytes = header.point_data_record_length;
+        let too_long = || WriteError::CloudRecord { path: file.target.clone(), bytes };
+        let record_bytes = bytes.checked_add(LABEL_BYTES).ok_or_else(too_long)?;
         // Descriptions that do not fit the points are of no use to anybody.
         let extra = usize::from(format.extra_bytes);
         let described = with_grain_id(described, extra).or_else(|| with_grain_id(&[], extra));
