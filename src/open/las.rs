@@ -44,8 +44,10 @@ pub(super) struct LasPoints {
     /// Steps of the coordinates.
     pub(super) scale: [f64; 3],
     pub(super) offset: [f64; 3],
-    /// Lowest and highest coordinates of the points. What the header says of them is not believed.
+    /// Lowest and highest coordinates of the points.
     pub(super) bounds: ([f64; 3], [f64; 3]),
+    /// The same as the header says, which many writers do not keep up: not used for anything.
+    pub(super) declared_bounds: ([f64; 3], [f64; 3]),
     /// Bytes behind the last point that nothing declares.
     pub(super) trailing_bytes: u64,
     pub(super) warnings: Vec<Warning>,
@@ -77,7 +79,7 @@ pub(super) fn decode(path: &str, source: &MappedFile, progress: &Progress<'_>) -
         payload: 0,
         lines: 0,
     };
-    let axes = file.transforms();
+    let (axes, h) = (file.transforms(), &file.header);
     let axes = [axes.x, axes.y, axes.z];
     let corner = |raw: [i32; 3]| [0, 1, 2].map(|axis| axes[axis].direct(raw[axis]));
     let (one, other) = (corner(tally.lowest), corner(tally.highest));
@@ -94,6 +96,7 @@ pub(super) fn decode(path: &str, source: &MappedFile, progress: &Progress<'_>) -
         scale: axes.map(|axis| axis.scale),
         offset: axes.map(|axis| axis.offset),
         bounds,
+        declared_bounds: ([h.min_x, h.min_y, h.min_z], [h.max_x, h.max_y, h.max_z]),
         trailing_bytes: file.trailing_bytes,
         warnings,
     })

@@ -137,10 +137,8 @@ impl Converter {
         self.points.resize_for(slab.len() / record).copy_from_slice(slab);
         let (points, tally) = (&self.points, &mut self.tally);
         tally.points += points.len() as u64;
-        for (axis, raw) in
-            [column(points.x_raw()), column(points.y_raw()), column(points.z_raw())].into_iter().enumerate()
-        {
-            let (lowest, highest) = raw.fold((i32::MAX, i32::MIN), |(l, h), n| (l.min(n), h.max(n)));
+        let spans = [span(points.x_raw()), span(points.y_raw()), span(points.z_raw())];
+        for (axis, (lowest, highest)) in spans.into_iter().enumerate() {
             tally.lowest[axis] = tally.lowest[axis].min(lowest);
             tally.highest[axis] = tally.highest[axis].max(highest);
         }
@@ -174,6 +172,7 @@ impl Converter {
     }
 }
 
-fn column<'a>(numbers: impl Iterator<Item = i32> + 'a) -> Box<dyn Iterator<Item = i32> + 'a> {
-    Box::new(numbers)
+/// Lowest and highest of some numbers.
+fn span(numbers: impl Iterator<Item = i32>) -> (i32, i32) {
+    numbers.fold((i32::MAX, i32::MIN), |(lowest, highest), n| (lowest.min(n), highest.max(n)))
 }

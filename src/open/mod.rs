@@ -7,16 +7,16 @@ mod error;
 mod faces;
 mod frame;
 mod gdal_messages;
-#[allow(dead_code)]
+#[allow(dead_code, reason = "clouds in LAS are not opened by a run yet")]
 mod las;
-#[allow(dead_code)]
+#[allow(dead_code, reason = "clouds in LAS are not opened by a run yet")]
 mod las_crs;
-#[allow(dead_code)]
+#[allow(dead_code, reason = "clouds in LAS are not opened by a run yet")]
 mod las_header;
 mod las_records;
 #[cfg(test)]
 mod las_tests;
-#[allow(dead_code)]
+#[allow(dead_code, reason = "clouds in LAS are not opened by a run yet")]
 mod laz_chunks;
 mod mapped;
 mod numbers;
@@ -40,9 +40,9 @@ pub use draped::DrapedCloud;
 pub use error::OpenError;
 pub use frame::{Crs, Frame};
 pub use gdal_messages::{gdal_failures, listen_to_gdal};
-#[allow(unused_imports)]
+#[allow(unused_imports, reason = "clouds in LAS are not opened by a run yet")]
 pub(crate) use las_header::{COPC_USER, LASZIP_RECORD, LasInput, MINOR_VERSION_AT, VariableRecord};
-#[allow(unused_imports)]
+#[allow(unused_imports, reason = "clouds in LAS are not opened by a run yet")]
 pub(crate) use laz_chunks::laz_items;
 pub use reach::Reach;
 pub use scalar::Scalar;

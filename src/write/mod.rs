@@ -13,7 +13,7 @@ mod atomic;
 pub mod columns;
 mod csv;
 mod error;
-#[allow(dead_code)]
+#[allow(dead_code, reason = "clouds in LAS are not opened by a run yet")]
 mod extra_bytes;
 mod gdal_calls;
 mod gdal_options;
@@ -21,13 +21,13 @@ mod gdal_watch;
 mod geotiff;
 mod gpkg;
 mod json;
-#[allow(dead_code)]
+#[allow(dead_code, reason = "clouds in LAS are not opened by a run yet")]
 mod labelled_cloud;
 #[cfg(test)]
 mod labelled_cloud_tests;
 mod labelled_mesh;
 mod layers;
-#[allow(dead_code)]
+#[allow(dead_code, reason = "clouds in LAS are not opened by a run yet")]
 mod laz_stream;
 mod source;
 mod wkb;
