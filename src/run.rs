@@ -101,7 +101,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let mut work = WorkFolder::open(job.work.as_deref(), &job.out)?;
     let (pool, memory) = (pool(settings)?, memory_bytes(settings));
     let (threads, instructions) = (pool.current_num_threads(), instructions(settings)?);
-    let labelled = settings.output.labelled_mesh;
+    let labelled = settings.output.labelled_mesh || settings.output.labelled_cloud;
 
     // open
     let (reach, warnings) = pool.install(|| open_survey(&inputs, &settings.input, progress))?;
@@ -220,6 +220,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
         facts: &facts,
         costs: &|| serde_json::json!(meter.costs()),
         mesh: labelled.then_some(&mesh),
+        cloud: settings.output.labelled_cloud.then_some(&reach),
     };
     let files = write(&folder, &results, progress, control)?;
     if lost.is_empty() {
@@ -325,6 +326,9 @@ fn check_outputs(reach: &Reach, index: &Index, settings: &Settings) -> Result<()
     if settings.raster.cell_m > 0.0 {
         RasterGrid::new(reach.frame(), &index.scale, settings.raster.cell_m)?;
     }
+    if settings.output.labelled_cloud && !reach.is_cloud() {
+        return Err(WriteError::NoCloud.into());
+    }
     if settings.output.labelled_mesh && reach.vertices() > u64::from(u32::MAX) {
         return Err(WriteError::TooManyVertices { vertices: reach.vertices() }.into());
     }
@@ -345,7 +349,7 @@ fn write(
     progress: &dyn Progress,
     control: &Control,
 ) -> Result<Vec<PathBuf>, Error> {
-    let files = crate::write::OUTPUTS.len() - usize::from(results.mesh.is_none());
+    let files = results.names().len();
     progress.begin("write", files as u64, Unit::Files);
     let written = write_unnamed(folder, results, &|_| progress.advance(1));
     progress.end();

@@ -36,6 +36,7 @@ What is written to OUT:
   summary.json       counts and percentiles of the whole survey
   run.json           version, settings, inputs, warnings, lost tiles, CPU time of each stage, peak memory
   labelled_mesh.ply  with --labelled-mesh: the input with a grain_id for each face
+  labelled_cloud.laz with --labelled-cloud: the input points with a grain_id for each
 
 The result does not depend on --tile-size, --threads and --memory.";
 
@@ -140,9 +141,13 @@ pub struct SettingArgs {
     /// Most memory to use, such as 2GiB [work.memory; default: half of what is there]
     #[arg(long, value_name = "SIZE", help_heading = "Work")]
     pub memory: Option<String>,
-    /// Also write the input mesh with a grain_id for each face [output.labelled_mesh; default: false]
+    /// Also write the input mesh, or the surface of a cloud, with a grain_id for each face [output.labelled_mesh; default:
+    /// false]
     #[arg(long, help_heading = "Output")]
     pub labelled_mesh: bool,
+    /// Also write the points of a cloud with a grain_id for each, as LAZ [output.labelled_cloud; default: false]
+    #[arg(long, help_heading = "Output")]
+    pub labelled_cloud: bool,
 }
 
 /// East, north and up shift, map units.
@@ -183,6 +188,7 @@ impl SettingArgs {
         set("work.threads", self.threads.map(|v| v.to_string()));
         set("work.memory", self.memory.as_deref().map(word));
         set("output.labelled_mesh", self.labelled_mesh.then(|| "true".into()));
+        set("output.labelled_cloud", self.labelled_cloud.then(|| "true".into()));
         Settings::load(self.config.as_deref(), &all)
     }
 }

@@ -196,6 +196,54 @@ pub enum OpenError {
     )]
     PrintedStep { path: String, largest: f64, step_m: f64, edge_m: f64 },
 
+    /// The first four bytes are not `LASF`.
+    #[error(
+        "{path}: is not a LAS file: it starts with `{start}`, not with `LASF`\nhelp: export the cloud again as LAS or LAZ, for \
+         instance from CloudCompare or PDAL"
+    )]
+    NotLas { path: String, start: String },
+    /// A version that does not exist.
+    #[error(
+        "{path}: is LAS version {major}.{minor}; versions 1.0 to 1.5 are known\nhelp: export the cloud again as LAS 1.4, or \
+         check that the file is not damaged"
+    )]
+    LasVersion { path: String, major: u8, minor: u8 },
+    /// A point format that does not exist.
+    #[error(
+        "{path}: has points of format {number}; formats 0 to 10 are known\nhelp: export the cloud again as LAS 1.4, or check \
+         that the file is not damaged"
+    )]
+    LasFormat { path: String, number: u8 },
+    /// A header that contradicts itself or the file.
+    #[error(
+        "{path}: the LAS header is damaged: {reason}\nhelp: the file is cut off or damaged; copy or export it again"
+    )]
+    LasHeader { path: String, reason: String },
+    /// A scale or an offset that makes no coordinates.
+    #[error(
+        "{path}: coordinates along {axis} have scale {scale:e} and offset {offset:e}, which makes no numbers of \
+         them\nhelp: the header is damaged; export the cloud again"
+    )]
+    LasTransform { path: String, axis: char, scale: f64, offset: f64 },
+    /// More or fewer points than declared.
+    #[error(
+        "{path}: the header declares {declared} points, but the file ({bytes} bytes) holds {found}\nhelp: the file is cut \
+         off, or its writer did not finish; copy or export it again"
+    )]
+    LasCount { path: String, bytes: u64, declared: u64, found: u64 },
+    /// What says how a LAZ file is packed is no good.
+    #[error(
+        "{path}: the LAZ file cannot be unpacked: {reason}\nhelp: the file is cut off or damaged, or its writer did not \
+         finish; copy or export it again"
+    )]
+    LazTable { path: String, reason: String },
+    /// A chunk of a LAZ file cannot be unpacked.
+    #[error(
+        "{path}: points {first} to {last}, packed at byte {byte}, cannot be unpacked: {reason}\nhelp: the file is \
+         damaged; copy or export it again"
+    )]
+    LazChunk { path: String, first: u64, last: u64, byte: u64, reason: String },
+
     /// A CRS that is neither code, text nor file.
     #[error("{origin}: is neither EPSG:n, nor WKT, nor a file\nhelp: give a code such as EPSG:2193 or a .prj file")]
     CrsForm { origin: String },

@@ -1,5 +1,6 @@
 //! Opening a survey: files become arrays in one frame. Knows formats and georeferencing, nothing else.
 
+mod agreement;
 mod bits;
 mod chunks;
 mod crs;
@@ -11,6 +12,13 @@ mod frame;
 mod gdal_messages;
 mod georeference;
 mod inputs;
+mod las;
+mod las_crs;
+mod las_header;
+mod las_records;
+#[cfg(test)]
+mod las_tests;
+mod laz_chunks;
 mod mapped;
 mod numbers;
 mod offset_file;
@@ -19,6 +27,7 @@ mod ply_header;
 mod precision;
 mod printed;
 mod progress;
+mod quiet;
 mod reach;
 mod records;
 mod sample;
@@ -38,6 +47,8 @@ pub use frame::{Crs, Frame};
 pub use gdal_messages::{gdal_failures, listen_to_gdal};
 pub use georeference::{CrsCandidate, CrsSource, Georeference, NamedCrs, resolve_crs};
 pub use inputs::{Inputs, resolve_inputs};
+pub(crate) use las_header::{COPC_USER, LASZIP_RECORD, LasInput, MINOR_VERSION_AT, VariableRecord};
+pub(crate) use laz_chunks::laz_items;
 pub use offset_file::OffsetFile;
 pub use reach::Reach;
 pub use scalar::Scalar;

@@ -1,8 +1,10 @@
-//! PLY meshes and point clouds.
+//! PLY meshes and point clouds, and LAS point clouds, which become the same records.
 
 use super::declared::check_length;
 use super::error::OpenError;
 use super::faces::Faces;
+use super::las::{LasPoints, decode};
+use super::las_crs::CloudCrs;
 use super::mapped::MappedFile;
 use super::ply_header::PlyHeader;
 use super::printed::PrintedDigits;
@@ -12,6 +14,7 @@ use super::records::{Source, locate};
 use super::survey_file::Fingerprint;
 use super::transcode::{Transcoded, is_needed, transcode};
 use super::vertices::Vertices;
+use super::warning::Warning;
 use ply_rs_bw::ply::Encoding;
 
 /// A validated PLY mesh, or a point cloud, which has no faces: no later read of a vertex or triangle below the counts
@@ -33,7 +36,25 @@ pub(super) struct PlyMesh {
     pub(super) trailing_bytes: u64,
     /// How finely a text prints the coordinates.
     pub(super) printed: Option<PrintedDigits>,
+    /// What a LAS file says beside its points.
+    pub(super) las: Option<LasFacts>,
 }
+
+/// What a LAS file says beside its points.
+#[derive(Debug)]
+pub(super) struct LasFacts {
+    /// Such as `LAZ 1.4, point format 7`.
+    pub(super) format: String,
+    pub(super) crs: CloudCrs,
+    /// Steps of the coordinates, input units.
+    pub(super) scale: [f64; 3],
+    /// Noise and withheld points.
+    pub(super) skipped: u64,
+    pub(super) warnings: Vec<Warning>,
+}
+
+/// How LAS and LAZ files begin.
+const LAS_SIGNATURE: &[u8] = b"LASF";
 
 impl PlyMesh {
     /// Reads the header and validates every vertex and face.
@@ -41,6 +62,9 @@ impl PlyMesh {
     /// # Errors
     /// Everything that [`OpenError`] says about PLY files.
     pub(super) fn open(path: &str, bytes: MappedFile, progress: &Progress<'_>) -> Result<PlyMesh, OpenError> {
+        if bytes.starts_with(LAS_SIGNATURE) {
+            return PlyMesh::of_las(path, &bytes, progress);
+        }
         let header = PlyHeader::parse(path, &bytes)?;
         check_has_vertices(path, &header)?;
         check_length(Source { path, bytes: &bytes }, &header)?;
@@ -50,6 +74,17 @@ impl PlyMesh {
             None => mesh,
             Some((line, text)) => refuse_misread(mesh, path, line, text),
         }
+    }
+
+    /// Decodes the points of a LAS, LAZ or COPC file.
+    fn of_las(path: &str, bytes: &MappedFile, progress: &Progress<'_>) -> Result<PlyMesh, OpenError> {
+        let fingerprint = Fingerprint::of(bytes, bytes.modified_s());
+        let points = decode(path, bytes, progress)?;
+        let LasPoints { format, crs, scale, skipped, warnings, trailing_bytes, .. } = points;
+        let las = Some(LasFacts { format, crs, scale, skipped, warnings });
+        check_has_vertices(path, &points.header)?;
+        let cloud = PlyMesh::records(path, (points.bytes, fingerprint), points.header, progress)?;
+        Ok(PlyMesh { trailing_bytes, las, ..cloud })
     }
 
     /// Validates every vertex and face that the header declares.
@@ -101,7 +136,18 @@ impl PlyMesh {
         let bounds = vertices.validate(source, progress)?;
         let trailing_bytes = bytes.len() as u64 - at;
         let encoding = header.encoding;
-        Ok(PlyMesh { bytes, fingerprint, encoding, header, vertices, faces, bounds, trailing_bytes, printed: None })
+        Ok(PlyMesh {
+            bytes,
+            fingerprint,
+            encoding,
+            header,
+            vertices,
+            faces,
+            bounds,
+            trailing_bytes,
+            printed: None,
+            las: None,
+        })
     }
 
     /// The file's bytes.

@@ -1,8 +1,10 @@
 //! A survey: one or several files in one frame.
 
+use super::agreement::{check_heights, check_same_kind, stated_systems};
 use super::error::OpenError;
 use super::frame::Frame;
 use super::georeference::{Georeference, SideFiles};
+use super::las_crs::CloudCrs;
 use super::mapped::MappedFile;
 use super::ply::PlyMesh;
 use super::precision::{check_not_degrees, check_precision};
@@ -54,9 +56,12 @@ impl Reach {
         progress: &(dyn Fn(u64, u64) + Sync),
     ) -> Result<(Reach, Vec<Warning>), OpenError> {
         // Before the files: what is wrong with a side file is told at once.
-        let georeference = SideFiles::read(paths, input)?.resolve(&[])?;
+        let side_files = SideFiles::read(paths, input)?;
+        side_files.resolve(&[])?;
         let files = open_files(paths, progress)?;
         check_same_kind(&files)?;
+        let georeference = side_files.resolve(&stated_systems(&files))?;
+        check_heights(&files, &georeference)?;
         let bounds = joint_bounds(&files);
         let frame = georeference.frame(bounds.0);
         check_extent(&files, &frame, &bounds)?;
@@ -279,6 +284,12 @@ impl Reach {
                 let lines = file.mesh.header.skipped.len() as u64;
                 warnings.push(Warning::HeaderLinesSkipped { path: name(file), line, text, lines });
             }
+            if let Some(las) = &file.mesh.las {
+                warnings.extend(las.warnings.iter().cloned());
+                if let CloudCrs::Unusable { reason } = &las.crs {
+                    warnings.push(Warning::CrsUnusable { path: name(file), reason: reason.clone() });
+                }
+            }
             if let Some(reason) = &file.mesh.vertices.color_refused {
                 warnings.push(Warning::ColoursIgnored { path: name(file), reason: reason.clone() });
             }
@@ -323,17 +334,6 @@ fn open_files(paths: &[PathBuf], tell: &(dyn Fn(u64, u64) + Sync)) -> Result<Vec
         progress.reach(done);
     }
     Ok(files)
-}
-
-fn check_same_kind(files: &[SurveyFile]) -> Result<(), OpenError> {
-    let find = |cloud: bool| files.iter().find(|f| (f.triangles() == 0) == cloud);
-    match (find(false), find(true)) {
-        (Some(mesh), Some(cloud)) => {
-            let name = |file: &SurveyFile| file.path.display().to_string();
-            Err(OpenError::MeshAndCloud { mesh: name(mesh), cloud: name(cloud) })
-        }
-        _ => Ok(()),
-    }
 }
 
 fn joint_bounds(files: &[SurveyFile]) -> ([f64; 3], [f64; 3]) {

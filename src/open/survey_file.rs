@@ -106,7 +106,20 @@ impl SurveyFile {
 
     /// Format and encoding, such as `PLY binary_little_endian`.
     pub fn format(&self) -> String {
-        format!("PLY {}", self.mesh.encoding)
+        match &self.mesh.las {
+            Some(las) => las.format.clone(),
+            None => format!("PLY {}", self.mesh.encoding),
+        }
+    }
+
+    /// Points of a cloud that are noise or withheld, and are not used.
+    pub fn skipped(&self) -> u64 {
+        self.mesh.las.as_ref().map_or(0, |las| las.skipped)
+    }
+
+    /// Whether it is a LAS, LAZ or COPC file.
+    pub fn is_las(&self) -> bool {
+        self.mesh.las.is_some()
     }
 
     /// Types of x, y and z.
@@ -132,6 +145,9 @@ impl SurveyFile {
     /// Coarsest distance between neighbouring values of the file's coordinates at their largest, input
     /// units; `None` if all are whole numbers.
     pub fn coordinate_step(&self) -> Option<f64> {
+        if let Some(las) = &self.mesh.las {
+            return las.scale.into_iter().map(f64::abs).reduce(f64::max);
+        }
         let printed = self.mesh.printed.as_ref();
         let held = coarsest_step(self.axis_types(), self.input_bounds(), printed).map(|(step, _)| step);
         let printed = printed.and_then(|printed| printed_step(printed, self.input_bounds())).map(|(step, _)| step);

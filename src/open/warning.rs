@@ -58,6 +58,18 @@ pub enum Warning {
         /// Mean edge, metres.
         edge_m: f64,
     },
+    /// A header speaks of a coordinate system, but not so that it can be used.
+    CrsUnusable {
+        /// The file.
+        path: String,
+        /// What there is.
+        reason: String,
+    },
+    /// The file has fields for colours, but nothing in them.
+    ColorsAllZero {
+        /// The file.
+        path: String,
+    },
     /// Some files have colours and some do not.
     SomeFilesWithoutColours {
         /// The first file without.
@@ -104,6 +116,15 @@ impl fmt::Display for Warning {
                 f,
                 "{path}: coordinates are printed in steps of {step_m} m, and the mean edge is {edge_m:.3e} m long: \
                  unless they are exact, the surface is roughened\nhelp: export them with more digits, or as binary PLY"
+            ),
+            Warning::CrsUnusable { path, reason } => write!(
+                f,
+                "{path}: the coordinate system in the header cannot be used: {reason}\nhelp: name it with --crs"
+            ),
+            Warning::ColorsAllZero { path } => write!(
+                f,
+                "{path}: red, green and blue are 0 at every point, so it is taken as a cloud without colours\nhelp: if the \
+                 survey has colours, export them with the points"
             ),
             Warning::SomeFilesWithoutColours { path } => write!(
                 f,

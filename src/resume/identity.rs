@@ -52,6 +52,7 @@ impl Identity {
     pub(super) fn and_grains(mut self, settings: &Settings, outline_step_m: f64) -> Identity {
         self.add("segment", serde_json::json!(settings.segment));
         self.0.insert("output.labelled_mesh".into(), settings.output.labelled_mesh.into());
+        self.0.insert("output.labelled_cloud".into(), settings.output.labelled_cloud.into());
         self.0.insert("step of outlines, metres".into(), outline_step_m.to_string().into());
         self
     }

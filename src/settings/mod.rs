@@ -237,6 +237,8 @@ pub enum Instructions {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
 #[serde(default, deny_unknown_fields)]
 pub struct OutputSettings {
-    /// Whether the input mesh is written again with a `grain_id` for each face.
+    /// Whether the input mesh, or the surface of a cloud, is written again with a `grain_id` for each face.
     pub labelled_mesh: bool,
+    /// Whether the points of a cloud are written again with a `grain_id` for each.
+    pub labelled_cloud: bool,
 }

@@ -13,8 +13,8 @@ use std::path::{Path, PathBuf};
 pub const REPORT: &str = "run.json";
 
 /// Names of all files that a run may write, in the order in which they get their final names.
-pub const OUTPUTS: [&str; 6] =
-    ["grains.gpkg", "grains.csv", "grain_size.tif", "labelled_mesh.ply", "summary.json", REPORT];
+pub const OUTPUTS: [&str; 7] =
+    ["grains.gpkg", "grains.csv", "grain_size.tif", "labelled_mesh.ply", "labelled_cloud.laz", "summary.json", REPORT];
 
 /// What GDAL and SQLite may leave beside a file that they did not finish.
 const SIDECARS: [&str; 6] = ["-journal", "-wal", "-shm", ".aux.xml", ".msk.ovr.tmp", ".ovr.tmp"];

@@ -1,5 +1,6 @@
 //! What can go wrong while results are written.
 
+use crate::open::OpenError;
 use crate::statistics::RasterError;
 use std::path::PathBuf;
 
@@ -7,6 +8,11 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WriteError {
+    /// A labelled cloud of meshes.
+    #[error(
+        "--labelled-cloud: the inputs are meshes, not point clouds\nhelp: give --labelled-mesh, which writes the mesh with a grain_id for each face"
+    )]
+    NoCloud,
     /// The output folder's name belongs to something else.
     #[error("{path}: is not a folder, so no results can go into it\nhelp: name another output folder", path = path.display())]
     NotAFolder {
@@ -107,6 +113,17 @@ pub enum WriteError {
     /// The grain-size raster cannot be laid out.
     #[error(transparent)]
     Raster(#[from] RasterError),
+    /// The input cloud cannot be read again.
+    #[error(transparent)]
+    Cloud(Box<OpenError>),
+    /// A point of the labelled cloud would be longer than LAS allows, or could not be described.
+    #[error("{path}: points of {bytes} bytes, as the input has them, leave no room for a described grain_id (65535 bytes in all)\nhelp: run without the labelled cloud, or drop extra dimensions of the input", path = path.display())]
+    CloudRecord {
+        /// The file.
+        path: PathBuf,
+        /// Bytes of a point of the input.
+        bytes: u16,
+    },
     /// The labelled mesh cannot number this many grains.
     #[error("{grains} grains: a labelled mesh numbers its grains with 32-bit integers, {most} at most\nhelp: run without the labelled mesh, or cut the survey", most = i32::MAX)]
     TooManyGrains {
@@ -189,6 +206,12 @@ pub enum WriteError {
         /// Bytes of the record.
         found: usize,
     },
+}
+
+impl From<OpenError> for WriteError {
+    fn from(error: OpenError) -> WriteError {
+        WriteError::Cloud(Box::new(error))
+    }
 }
 
 fn found(ours: &[String], others: usize) -> String {

@@ -40,18 +40,7 @@ pub(crate) fn write(file: &Pending, results: &Results, mesh: &dyn MeshSource) ->
         return Err(WriteError::TooManyVertices { vertices: mesh.vertices() });
     }
     let triangles = triangle_labels(results, mesh)?;
-    let mut vertices = labels(mesh.vertices(), "vertices")?;
-    let mut most_corners = 0;
-    each_face(mesh, &triangles, |corners, label| {
-        most_corners = most_corners.max(corners.len());
-        for &corner in corners {
-            let of_vertex = &mut vertices[corner as usize];
-            if label != NONE && (*of_vertex == NONE || label < *of_vertex) {
-                *of_vertex = label;
-            }
-        }
-        Ok(())
-    })?;
+    let (vertices, most_corners) = vertex_labels(mesh, &triangles)?;
     let failed = |source| file.error("write the labelled mesh", source);
     let mut out = BufWriter::with_capacity(1 << 20, File::create(&file.partial).map_err(failed)?);
     out.write_all(header(results, mesh, &properties, most_corners).as_bytes()).map_err(failed)?;
@@ -71,6 +60,23 @@ pub(crate) fn write(file: &Pending, results: &Results, mesh: &dyn MeshSource) ->
         out.write_all(&record).map_err(failed)
     })?;
     out.flush().map_err(failed)
+}
+
+/// The lowest grain of the faces around each vertex, and the corners of the largest face.
+pub(super) fn vertex_labels(mesh: &dyn MeshSource, triangles: &[i32]) -> Result<(Vec<i32>, usize), WriteError> {
+    let mut vertices = labels(mesh.vertices(), "vertices")?;
+    let mut most_corners = 0;
+    each_face(mesh, triangles, |corners, label| {
+        most_corners = most_corners.max(corners.len());
+        for &corner in corners {
+            let of_vertex = &mut vertices[corner as usize];
+            if label != NONE && (*of_vertex == NONE || label < *of_vertex) {
+                *of_vertex = label;
+            }
+        }
+        Ok(())
+    })?;
+    Ok((vertices, most_corners))
 }
 
 /// Bytes of a vertex record.
@@ -97,7 +103,7 @@ fn labels(items: u64, what: &'static str) -> Result<Vec<i32>, WriteError> {
 }
 
 /// The grain of every triangle.
-fn triangle_labels(results: &Results, mesh: &dyn MeshSource) -> Result<Vec<i32>, WriteError> {
+pub(super) fn triangle_labels(results: &Results, mesh: &dyn MeshSource) -> Result<Vec<i32>, WriteError> {
     let mut of_triangle = labels(mesh.triangles(), "triangles")?;
     for numbered in &results.catalogue.grains {
         let grain_id = numbered.grain_id;

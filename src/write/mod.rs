@@ -6,6 +6,7 @@
 //! | `grains.csv` | the table of grains; the only columns are those of [`columns::COLUMNS`] |
 //! | `grain_size.tif` | Cloud-Optimised GeoTIFF of grain sizes, count and cover |
 //! | `labelled_mesh.ply` | on request: the input mesh with a `grain_id` per face and vertex |
+//! | `labelled_cloud.laz` | on request: the input points with the grain of each |
 //! | `summary.json` | counts, areas and percentiles |
 //! | `run.json` | program, version, settings, what came in, what was refused, what each stage cost |
 
@@ -13,14 +14,19 @@ mod atomic;
 pub mod columns;
 mod csv;
 mod error;
+mod extra_bytes;
 mod gdal_calls;
 mod gdal_options;
 mod gdal_watch;
 mod geotiff;
 mod gpkg;
 mod json;
+mod labelled_cloud;
+#[cfg(test)]
+mod labelled_cloud_tests;
 mod labelled_mesh;
 mod layers;
+mod laz_stream;
 mod source;
 mod wkb;
 
@@ -31,7 +37,7 @@ pub use source::WholeMesh;
 
 use crate::geometry::PlanBox;
 use crate::index::Scale;
-use crate::open::Frame;
+use crate::open::{Frame, Reach};
 use crate::settings::Settings;
 use crate::statistics::{GrainSizeRaster, Summary};
 use crate::stitch::{Catalogue, TileReport};
@@ -60,8 +66,22 @@ pub struct Results<'a> {
     pub facts: &'a serde_json::Value,
     /// What the run has cost so far, for `run.json`: an object, asked for when that file is written.
     pub costs: &'a dyn Fn() -> serde_json::Value,
-    /// The input mesh, if it is to be written again with labels.
+    /// The input's surface, if it or the points are to be written again with labels.
     pub mesh: Option<&'a dyn MeshSource>,
+    /// The points, if they are to be written again with labels.
+    pub cloud: Option<&'a Reach>,
+}
+
+impl Results<'_> {
+    /// The files that are written, in order.
+    pub(crate) fn names(&self) -> Vec<&'static str> {
+        let is_wanted = |name: &&str| match *name {
+            "labelled_mesh.ply" => self.settings.output.labelled_mesh && self.mesh.is_some(),
+            "labelled_cloud.laz" => self.cloud.is_some() && self.mesh.is_some(),
+            _ => true,
+        };
+        OUTPUTS.into_iter().filter(is_wanted).collect()
+    }
 }
 
 /// Writes all results and returns their paths. `progress` hears the name of each file before it is written.
@@ -87,8 +107,7 @@ pub(crate) fn write_unnamed(
         results.surveyed,
     )?;
     let summary = Summary::new(results.catalogue, results.settings, results.scale, results.smallest_grain_area_m2);
-    let names: Vec<&str> =
-        OUTPUTS.into_iter().filter(|&name| name != "labelled_mesh.ply" || results.mesh.is_some()).collect();
+    let names = results.names();
     let mut written = Vec::with_capacity(names.len());
     for &name in &names {
         progress(name);
@@ -98,6 +117,7 @@ pub(crate) fn write_unnamed(
             ("grains.csv", _) => csv::write(&file, results)?,
             ("grain_size.tif", _) => geotiff::write(&file, results, &raster, &summary)?,
             ("labelled_mesh.ply", Some(mesh)) => labelled_mesh::write(&file, results, mesh)?,
+            ("labelled_cloud.laz", Some(mesh)) => labelled_cloud::write(&file, results, mesh)?,
             ("summary.json", _) => json::write_summary(&file, &summary)?,
             _ => json::write_run(&file, results, &names)?,
         }
