@@ -19,6 +19,9 @@ pub fn facts(reach: &Reach, index: &Index, plan: &Plan, warnings: &[String], los
                 "vertices": f.vertices(),
                 "faces": f.faces(),
                 "triangles": f.triangles(),
+                "format": f.format(),
+                "noise_points": f.noise_and_withheld()[0],
+                "withheld_points": f.noise_and_withheld()[1],
                 "fingerprint": f.fingerprint(),
             })
         })

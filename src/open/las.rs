@@ -36,18 +36,13 @@ pub(super) struct LasPoints {
     pub(super) noise: u64,
     /// Points with the flag `withheld`.
     pub(super) withheld: u64,
-    /// Points that are one or both.
-    pub(super) skipped: u64,
     /// Such as `LAZ 1.4, point format 7`.
     pub(super) format: String,
     pub(super) crs: CloudCrs,
     /// Steps of the coordinates.
     pub(super) scale: [f64; 3],
-    pub(super) offset: [f64; 3],
-    /// Lowest and highest coordinates of the points.
+    /// Lowest and highest coordinates of the points. Those that the header states are often wrong, and not used.
     pub(super) bounds: ([f64; 3], [f64; 3]),
-    /// The same as the header says, which many writers do not keep up: not used for anything.
-    pub(super) declared_bounds: ([f64; 3], [f64; 3]),
     /// Bytes behind the last point that nothing declares.
     pub(super) trailing_bytes: u64,
     pub(super) warnings: Vec<Warning>,
@@ -80,7 +75,7 @@ pub(super) fn decode(path: &str, source: &MappedFile, progress: &Progress<'_>) -
         lines: 0,
         skipped: Vec::new(),
     };
-    let (axes, h) = (file.transforms(), &file.header);
+    let axes = file.transforms();
     let axes = [axes.x, axes.y, axes.z];
     let corner = |raw: [i32; 3]| [0, 1, 2].map(|axis| axes[axis].direct(raw[axis]));
     let (one, other) = (corner(tally.lowest), corner(tally.highest));
@@ -91,13 +86,10 @@ pub(super) fn decode(path: &str, source: &MappedFile, progress: &Progress<'_>) -
         header,
         noise: tally.noise,
         withheld: tally.withheld,
-        skipped: tally.skipped,
         format: file.format_name(),
         crs: file.crs(),
         scale: axes.map(|axis| axis.scale),
-        offset: axes.map(|axis| axis.offset),
         bounds,
-        declared_bounds: ([h.min_x, h.min_y, h.min_z], [h.max_x, h.max_y, h.max_z]),
         trailing_bytes: file.trailing_bytes,
         warnings,
     })

@@ -55,7 +55,6 @@ pub(super) struct Tally {
     pub(super) points: u64,
     pub(super) noise: u64,
     pub(super) withheld: u64,
-    pub(super) skipped: u64,
     /// Lowest and highest coordinates, as whole numbers.
     pub(super) lowest: [i32; 3],
     pub(super) highest: [i32; 3],
@@ -71,7 +70,6 @@ impl Default for Tally {
             points: 0,
             noise: 0,
             withheld: 0,
-            skipped: 0,
             lowest: [i32::MAX; 3],
             highest: [i32::MIN; 3],
             color_bits: 0,
@@ -86,7 +84,6 @@ impl Tally {
         self.points += other.points;
         self.noise += other.noise;
         self.withheld += other.withheld;
-        self.skipped += other.skipped;
         for axis in 0..3 {
             self.lowest[axis] = self.lowest[axis].min(other.lowest[axis]);
             self.highest[axis] = self.highest[axis].max(other.highest[axis]);
@@ -167,7 +164,6 @@ impl Converter {
             let noise = NOISE.contains(&class);
             tally.noise += u64::from(noise);
             tally.withheld += u64::from(withheld);
-            tally.skipped += u64::from(noise || withheld);
             to.extend([class, u8::from(noise || withheld)]);
         }
     }

@@ -48,8 +48,10 @@ pub(super) struct LasFacts {
     pub(super) crs: CloudCrs,
     /// Steps of the coordinates, input units.
     pub(super) scale: [f64; 3],
-    /// Noise and withheld points.
-    pub(super) skipped: u64,
+    /// Points of classes 7 and 18.
+    pub(super) noise: u64,
+    /// Points with the flag `withheld`.
+    pub(super) withheld: u64,
     pub(super) warnings: Vec<Warning>,
 }
 
@@ -80,11 +82,11 @@ impl PlyMesh {
     fn of_las(path: &str, bytes: &MappedFile, progress: &Progress<'_>) -> Result<PlyMesh, OpenError> {
         let fingerprint = Fingerprint::of(bytes, bytes.modified_s());
         let points = decode(path, bytes, progress)?;
-        let LasPoints { format, crs, scale, skipped, warnings, trailing_bytes, .. } = points;
-        let las = Some(LasFacts { format, crs, scale, skipped, warnings });
+        let LasPoints { format, crs, scale, noise, withheld, warnings, bounds, trailing_bytes, .. } = points;
+        let las = Some(LasFacts { format, crs, scale, noise, withheld, warnings });
         check_has_vertices(path, &points.header)?;
         let cloud = PlyMesh::records(path, (points.bytes, fingerprint), points.header, progress)?;
-        Ok(PlyMesh { trailing_bytes, las, ..cloud })
+        Ok(PlyMesh { bounds, trailing_bytes, las, ..cloud })
     }
 
     /// Validates every vertex and face that the header declares.

@@ -112,9 +112,9 @@ impl SurveyFile {
         }
     }
 
-    /// Points of a cloud that are noise or withheld, and are not used.
-    pub fn skipped(&self) -> u64 {
-        self.mesh.las.as_ref().map_or(0, |las| las.skipped)
+    /// Points of a cloud that are noise, and points that are withheld. Neither are used.
+    pub fn noise_and_withheld(&self) -> [u64; 2] {
+        self.mesh.las.as_ref().map_or([0; 2], |las| [las.noise, las.withheld])
     }
 
     /// Whether it is a LAS, LAZ or COPC file.

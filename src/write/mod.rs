@@ -76,7 +76,7 @@ impl Results<'_> {
     /// The files that are written, in order.
     pub(crate) fn names(&self) -> Vec<&'static str> {
         let is_wanted = |name: &&str| match *name {
-            "labelled_mesh.ply" => self.settings.output.labelled_mesh && self.mesh.is_some(),
+            "labelled_mesh.ply" => self.mesh.is_some() && (self.settings.output.labelled_mesh || self.cloud.is_none()),
             "labelled_cloud.laz" => self.cloud.is_some() && self.mesh.is_some(),
             _ => true,
         };

@@ -35,6 +35,7 @@ impl Survey {
             facts: &self.facts,
             costs: &|| serde_json::json!({ "stages": [] }),
             mesh,
+            cloud: None,
         }
     }
 }
