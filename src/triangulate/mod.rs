@@ -33,18 +33,20 @@ use umbrella::{Cell, ROUNDS, agreed};
 
 /// Neighbours of a point that are looked at.
 const AROUND: usize = 32;
-/// How far they may be, in spacings of the points in plan. Steep planes look no further for others that tell which side
-/// is up.
-const REACH: f64 = 3.5;
+/// How far they may be, in spacings of the points in plan: more than on level ground, for on steep ground points lie
+/// further apart than in plan.
+const REACH: f64 = 4.5;
+/// How far steep planes look for others that tell which side is up.
+const TURN_REACH: f64 = 3.0;
 /// A point is covered from above by others this far away in plan, if they are so steeply above it: 80 degrees.
 const COVER_REACH: f64 = 1.5;
 const COVER_STEEPNESS: f64 = 5.67;
 /// How long a side of a triangle may be.
-const LONGEST: f64 = 2.5;
+const LONGEST: f64 = 4.0;
 /// What may change a triangle lies so far around it: the triangles next to it, and those next to them, round by round.
 const TRIANGLES_REACH: f64 = LONGEST * (1 + ROUNDS.len()) as f64;
 /// And what may change the side to which the planes of their corners face.
-const FACING_REACH: f64 = TRIANGLES_REACH + REACH * TURNS as f64;
+const FACING_REACH: f64 = TRIANGLES_REACH + TURN_REACH * TURNS as f64;
 /// And the points that these planes are fitted to.
 const HALO: f64 = FACING_REACH + REACH;
 /// Memory for each point of a block while it is triangulated, bytes.
@@ -255,7 +257,7 @@ fn piece(mut sites: Vec<Site>, density: &Density, block: &Block, gap_spacings: f
         let spacing_m = density.spacing_m(density.cell_of(site.at));
         near.nearest(point, AROUND, REACH * spacing_m, &mut found);
         let is_covered = || near.is_covered(point, COVER_REACH * spacing_m, COVER_STEEPNESS);
-        let normal = facing.fit(point, &sites, &found, is_covered);
+        let normal = facing.fit(point, (&sites, &found), TURN_REACH * spacing_m, is_covered);
         if distance_m <= TRIANGLES_REACH * block.spacing_m {
             // So many points in a circle of this radius.
             let farthest2 = found.last().map_or(0.0, |n| n.0);

@@ -35,13 +35,13 @@ impl Facing {
         }
     }
 
-    /// Fits the plane of a point to its neighbours, nearest first. They will say to which side it faces, if it is steep, or
-    /// covered from above.
+    /// Fits the plane of a point to its neighbours, nearest first. Those up to `turn_reach_m` away will say to which side
+    /// it faces, if it is steep, or covered from above.
     pub(super) fn fit(
         &mut self,
         point: usize,
-        sites: &[Site],
-        found: &[Neighbour],
+        (sites, found): (&[Site], &[Neighbour]),
+        turn_reach_m: f64,
         is_covered: impl FnOnce() -> bool,
     ) -> DVec3 {
         let fitted = &found[..found.len().min(FITTED)];
@@ -50,7 +50,8 @@ impl Facing {
         self.known[point] = normal.z >= CLEARLY_UP && !is_covered();
         if !self.known[point] {
             self.open.push(point as u32);
-            self.around.extend(fitted.iter().map(|n| n.1));
+            let near = fitted.iter().take_while(|n| n.0 <= turn_reach_m * turn_reach_m);
+            self.around.extend(near.map(|n| n.1));
             self.start.push(self.around.len());
         }
         normal

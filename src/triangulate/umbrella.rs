@@ -18,7 +18,7 @@ const OTHER_FACE: f64 = 0.5;
 /// Where more than three points lie on one circle, so much of the squared spacing decides.
 const TIE_BREAK: f64 = 1e-7;
 /// Votes of the triangles that fill what is open, round by round.
-pub(super) const ROUNDS: [u8; 3] = [2, 1, 1];
+pub(super) const ROUNDS: [u8; 2] = [2, 1];
 
 /// A triangle: numbers of points, counter-clockwise seen from outside, the lowest first.
 pub(super) type Corners = [u32; 3];
