@@ -96,9 +96,14 @@ fn coordinates_that_are_no_numbers_are_refused_by_their_vertex() {
 }
 
 #[test]
-fn a_mesh_without_faces_or_vertices_is_refused() {
+fn a_mesh_without_vertices_and_a_cloud_without_a_surface_are_refused() {
     let points = MemorySurface { triangles: Vec::new(), ..small() };
-    Run::of(&ply(&points)).names_the_file().fails_with("point cloud");
+    let mut two = points.clone();
+    two.positions.truncate(2);
+    Run::of(&ply(&two)).fails_with("2 of the 2 points of the cloud can be used");
+    let mut line = points;
+    line.positions.iter_mut().for_each(|p| *p = DVec3::new(p.x, 0.0, 0.0));
+    Run::of(&ply(&line)).fails_with("no three are near enough for a triangle");
     Run::of(&ply(&MemorySurface::default())).names_the_file().fails_with("has 0 vertices");
 }
 

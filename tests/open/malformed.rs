@@ -134,7 +134,8 @@ fn a_path_that_is_no_file_is_refused() {
 
 #[test]
 fn something_other_than_ply_is_refused() {
-    assert_contains(&refusal(b"LASF\0\0\x01\0"), &["is not a PLY file", "`LASF"]);
+    assert_contains(&refusal(b"LASF\0\0\x01\0"), &["LAS header is damaged", "ends at byte 8"]);
+    assert_contains(&refusal(b"solid cube\n"), &["is not a PLY file", "`solid cube"]);
     assert_contains(&refusal(b"ply2\nformat ascii 1.0\n"), &["is not a PLY file"]);
 }
 
