@@ -116,8 +116,9 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let crew = Crew { pool, budget: Budget::strict(room.bytes), control: control.clone() };
     let earlier = work.index(&reach, settings)?;
     let made = earlier.is_none();
-    let surface =
-        |shelf: &Shelf| crew.pool.install(|| WholeSurface::of(&reach, settings, (shelf, room.bytes), progress));
+    let surface = |shelf: &Shelf| {
+        crew.pool.install(|| WholeSurface::of(&reach, settings, (shelf, room.bytes), (progress, control)))
+    };
     let mut whole = None;
     let mut index = match earlier {
         Some(index) => index,

@@ -3,11 +3,11 @@
 use crate::error::Error;
 use crate::forecast;
 use crate::open::{DrapedCloud, Reach, Surface};
-use crate::pipeline::return_free_memory;
+use crate::pipeline::{Control, return_free_memory};
 use crate::progress::{Progress, Unit};
 use crate::settings::Settings;
 use crate::store::Shelf;
-use crate::triangulate::{DrapeFigures, drape};
+use crate::triangulate::{DrapeError, DrapeFigures, drape};
 use crate::weld::{self, WeldFacts, Welded, parts, weld};
 
 /// The surface of a survey.
@@ -33,16 +33,21 @@ impl<'a> WholeSurface<'a> {
         reach: &'a Reach,
         settings: &Settings,
         (shelf, room): (&Shelf, u64),
-        progress: &dyn Progress,
+        (progress, control): (&dyn Progress, &Control),
     ) -> Result<WholeSurface<'a>, Error> {
         if !reach.is_cloud() {
             return welded(reach, settings.input.weld_m, forecast::weld_bytes(reach, room), progress);
         }
         progress.begin("surface", reach.vertices(), Unit::Vertices);
-        let draped = drape(reach, &|point| !reach.is_skipped(point), &settings.surface, (shelf, room))?;
+        let tell = |points| {
+            progress.advance(points);
+            control.check().map_err(|_| DrapeError::Stopped)
+        };
+        let draped = drape(reach, &|point| !reach.is_skipped(point), &settings.surface, (shelf, room), &tell);
+        control.check()?;
+        let draped = draped?;
         reach.release();
         return_free_memory();
-        progress.advance(reach.vertices());
         progress.end();
         Ok(WholeSurface::Cloud(DrapedCloud::new(reach, &draped.triangles, draped.wide)?, draped.figures))
     }

@@ -35,7 +35,9 @@ fn write_file(f: &mut Formatter<'_>, file: &FileFigures) -> fmt::Result {
     row(f, "coordinates", format!("{types}, {step}"))?;
     row(f, "colours", file.color_type.unwrap_or("none"))?;
     write_contents(f, &file.contents)?;
-    write_surface(f, &file.surface)?;
+    if file.contents.triangles > 0 {
+        write_surface(f, &file.surface)?;
+    }
     writeln!(f)
 }
 
@@ -60,7 +62,13 @@ fn write_survey(f: &mut Formatter<'_>, survey: &SurveyFigures, files: usize) -> 
     if files != 1 {
         row(f, "colours", if survey.has_colors { "yes" } else { "none" })?;
         write_contents(f, &survey.contents)?;
-        write_surface(f, &survey.surface)?;
+        if survey.contents.triangles > 0 {
+            write_surface(f, &survey.surface)?;
+        }
+    }
+    if let Some(spacing_m) = survey.point_spacing_m {
+        let about = length(survey.surface.mean_edge_m);
+        row(f, "points apart", format!("{}; the surface will have edges of about {about}", length(spacing_m)))?;
     }
     let s = &survey.suggestion;
     let smallest = format!("{} ({})", area(s.smallest_grain_area_m2), length(s.smallest_grain_diameter_m));
@@ -79,9 +87,13 @@ fn write_survey(f: &mut Formatter<'_>, survey: &SurveyFigures, files: usize) -> 
 }
 
 fn write_contents(f: &mut Formatter<'_>, c: &Contents) -> fmt::Result {
-    row(f, "vertices", c.vertices)?;
-    row(f, "faces", c.faces)?;
-    row(f, "triangles", c.triangles)?;
+    if c.triangles == 0 {
+        row(f, "points", c.vertices)?;
+    } else {
+        row(f, "vertices", c.vertices)?;
+        row(f, "faces", c.faces)?;
+        row(f, "triangles", c.triangles)?;
+    }
     for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
         let (min, max) = (c.min_input[axis], c.max_input[axis]);
         let metres = format!("{:.4} to {:.4} m", c.min_m[axis], c.max_m[axis]);

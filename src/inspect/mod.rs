@@ -8,9 +8,11 @@ use crate::geometry::{DVec3, ExactSum};
 use crate::open::{Fingerprint, Frame, Georeference, OpenError, Reach, Scalar, SurveyFile, resolve_inputs};
 use crate::pipeline::memory_there_bytes;
 use crate::settings::InputSettings;
+use crate::triangulate::point_spacing_m;
 use crate::weld::{self, WeldFacts, weld};
 use rayon::prelude::*;
 use serde::Serialize;
+use std::fmt::Display;
 use std::path::PathBuf;
 
 pub use needs::Needs;
@@ -40,8 +42,10 @@ pub struct SurveyFigures {
     pub georeference: Georeference,
     /// Whether every vertex has a colour.
     pub has_colors: bool,
-    /// What the surface is made of.
+    /// What the surface is made of; of a cloud, what it will be made of, about.
     pub surface: SurfaceFigures,
+    /// Of a cloud, the side of the square that a point has in plan, metres.
+    pub point_spacing_m: Option<f64>,
     /// What the survey can show, and settings for it.
     pub suggestion: Suggestion,
     /// What a run would take.
@@ -117,18 +121,30 @@ pub fn inspect(paths: &[PathBuf], input: &InputSettings) -> Result<Inspection, O
     let (reach, warnings) = Reach::open(&inputs.paths, input, &|_, _| {})?;
     let sums: Vec<Sums> = reach.files().iter().map(|f| Sums::of(&reach, f)).collect();
     let frame = reach.frame();
-    let files = reach.files().iter().zip(&sums).map(|(f, s)| file_figures(f, s, frame)).collect();
-    let surface = sums.iter().fold(Sums::default(), |a, &b| a.merge(b)).figures(reach.triangles());
-    let counts = [reach.vertices(), reach.faces(), reach.triangles()];
     let mut warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+    let refused = |refused: &dyn Display| format!("a run would be refused: {refused}");
+    let cloud = reach.is_cloud().then(|| point_spacing_m(&reach, &|point| !reach.is_skipped(point)));
+    if let Some(Err(error)) = &cloud {
+        warnings.push(refused(error));
+    }
+    let point_spacing_m = cloud.and_then(Result::ok).map(|(spacing_m, _)| spacing_m);
+    let figures = |sums: &Sums, vertices: u64, triangles: u64| match point_spacing_m {
+        Some(spacing_m) => SurfaceFigures::of_cloud(spacing_m, vertices),
+        None => sums.figures(triangles),
+    };
+    let of_file = |(f, s): (&SurveyFile, &Sums)| file_figures(f, figures(s, f.vertices(), f.triangles()), frame);
+    let files = reach.files().iter().zip(&sums).map(of_file).collect();
+    let all = sums.iter().fold(Sums::default(), |a, &b| a.merge(b));
+    let surface = figures(&all, reach.vertices(), reach.triangles());
+    let counts = [reach.vertices(), reach.faces(), reach.triangles()];
     let mut needs = Needs::of(&reach, memory_there_bytes());
     let weld = match weld(&reach, input.weld_m, u64::MAX) {
         Ok((welded, facts)) => {
             needs.least_memory_bytes += welded.bytes();
             facts
         }
-        Err(refused) => {
-            warnings.push(format!("a run would be refused: {refused}"));
+        Err(error) => {
+            warnings.push(refused(&error));
             None
         }
     };
@@ -140,6 +156,7 @@ pub fn inspect(paths: &[PathBuf], input: &InputSettings) -> Result<Inspection, O
         georeference: reach.georeference().clone(),
         has_colors: reach.has_colors(),
         surface,
+        point_spacing_m,
         suggestion: Suggestion::new(&surface, reach.has_colors()),
         needs,
     };
@@ -147,7 +164,7 @@ pub fn inspect(paths: &[PathBuf], input: &InputSettings) -> Result<Inspection, O
     Ok(Inspection { survey, files, notes, weld, warnings })
 }
 
-fn file_figures(file: &SurveyFile, sums: &Sums, frame: &Frame) -> FileFigures {
+fn file_figures(file: &SurveyFile, surface: SurfaceFigures, frame: &Frame) -> FileFigures {
     let counts = [file.vertices(), file.faces(), file.triangles()];
     FileFigures {
         path: file.path().display().to_string(),
@@ -158,7 +175,25 @@ fn file_figures(file: &SurveyFile, sums: &Sums, frame: &Frame) -> FileFigures {
         color_type: file.color_type().map(Scalar::ply_name),
         comments: file.comments().to_vec(),
         contents: Contents::new(counts, file.input_bounds(), frame),
-        surface: sums.figures(file.triangles()),
+        surface,
+    }
+}
+
+/// Mean edge of the Delaunay triangulation of points strewn at random, in spacings: 32 / (9 pi), Miles 1970,
+/// <https://doi.org/10.1016/0025-5564(70)90061-1>.
+const EDGE_SPACINGS: f64 = 1.1318;
+
+impl SurfaceFigures {
+    /// Of the surface that a cloud will get, about: two triangles for each point.
+    fn of_cloud(spacing_m: f64, points: u64) -> SurfaceFigures {
+        let square_m2 = spacing_m * spacing_m;
+        SurfaceFigures {
+            mean_edge_m: EDGE_SPACINGS * spacing_m,
+            mean_triangle_area_m2: square_m2 / 2.0,
+            surface_area_m2: square_m2 * points as f64,
+            triangles_per_m2: Some(2.0 / square_m2),
+            zero_area_triangles: 0,
+        }
     }
 }
 

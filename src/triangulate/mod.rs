@@ -78,6 +78,9 @@ pub enum DrapeError {
         /// Their usual distance, metres.
         typical_m: f64,
     },
+    /// Who was told of the progress did not want more.
+    #[error("the triangulation was stopped")]
+    Stopped,
     /// The work folder cannot be used.
     #[error(transparent)]
     Store(#[from] StoreError),
@@ -97,6 +100,9 @@ pub struct DrapeFigures {
     /// Usual distance of neighbouring points, metres: the side of the square that one has.
     pub spacing_m: f64,
 }
+
+/// Who hears of the progress, and may stop it by an error, [`DrapeError::Stopped`].
+pub type Tell<'a> = &'a (dyn Fn(u64) -> Result<(), DrapeError> + Sync);
 
 /// The triangles of a cloud.
 #[derive(Debug)]
@@ -133,10 +139,12 @@ impl Element for Site {
 #[derive(Default)]
 struct Piece {
     triangles: Vec<[u64; 3]>,
+    points: u64,
     same_place: u64,
 }
 
-/// Lays a surface over the points that are to be kept, in about `room` bytes, on all threads of the pool.
+/// Lays a surface over the points that are to be kept, in about `room` bytes, on all threads of the pool. `tell` hears from
+/// time to time how many more points are done, and may stop it.
 ///
 /// Triangles are seen counter-clockwise from outside, and in the same order whatever the room and the threads.
 ///
@@ -147,15 +155,16 @@ pub fn drape(
     keep: Keep,
     settings: &SurfaceSettings,
     (shelf, room): (&Shelf, u64),
+    tell: Tell,
 ) -> Result<Draped, DrapeError> {
-    drape_in_blocks(cloud, keep, settings, (shelf, room), blocks::MOST_POINTS)
+    drape_in_blocks(cloud, keep, settings, (shelf, room, tell), blocks::MOST_POINTS)
 }
 
 fn drape_in_blocks(
     cloud: &dyn Surface,
     keep: Keep,
     settings: &SurfaceSettings,
-    (shelf, room): (&Shelf, u64),
+    (shelf, room, tell): (&Shelf, u64, Tell),
     most_points: u64,
 ) -> Result<Draped, DrapeError> {
     let (density, kept) = Density::of(cloud, keep)?;
@@ -180,6 +189,7 @@ fn drape_in_blocks(
         };
         let pieces = wave.par_iter().with_max_len(1).map(work).collect::<Result<Vec<_>, StoreError>>()?;
         for piece in pieces {
+            tell(piece.points)?;
             figures.same_place += piece.same_place;
             figures.triangles += piece.triangles.len() as u64;
             for number in piece.triangles.as_flattened() {
@@ -241,6 +251,7 @@ fn piece(mut sites: Vec<Site>, density: &Density, block: &Block, gap_spacings: f
     let key = |s: &Site| (s.at.x, s.at.y, s.at.z, s.input);
     sites.sort_unstable_by(|a, b| key(a).partial_cmp(&key(b)).unwrap_or(Ordering::Equal));
     let is_ours = |site: &Site| block.holds(density.cell_of(site.at));
+    let points = sites.iter().filter(|site| is_ours(site)).count() as u64;
     let mut same_place = 0;
     sites.dedup_by(|b, a| {
         let same = a.at == b.at;
@@ -270,5 +281,5 @@ fn piece(mut sites: Vec<Site>, density: &Density, block: &Block, gap_spacings: f
     drop((near, facing));
     let ours = agreed(&sites, proposed, &turned).into_iter().filter(|corners| is_ours(&sites[corners[0] as usize]));
     let triangles = ours.map(|corners| corners.map(|v| sites[v as usize].input)).collect();
-    Piece { triangles, same_place }
+    Piece { triangles, points, same_place }
 }

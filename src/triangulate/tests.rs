@@ -34,7 +34,9 @@ fn ground(n: usize, seed: u64) -> Vec<DVec3> {
 fn draped(points: &[DVec3], settings: &SurfaceSettings, most_points: u64) -> (Vec<[u64; 3]>, DrapeFigures) {
     let folder = tempfile::tempdir().unwrap();
     let shelf = Shelf::new(folder.path()).unwrap();
-    let found = drape_in_blocks(&cloud(points.to_vec()), &|_| true, settings, (&shelf, 1 << 20), most_points).unwrap();
+    let found =
+        drape_in_blocks(&cloud(points.to_vec()), &|_| true, settings, (&shelf, 1 << 20, &|_| Ok(())), most_points)
+            .unwrap();
     let (mut file, mut bytes) = (found.triangles, Vec::new());
     file.rewind().unwrap();
     file.read_to_end(&mut bytes).unwrap();
@@ -179,7 +181,8 @@ fn points_that_are_not_kept_and_points_that_are_there_twice_do_not_matter() {
     more.extend((0..500).map(|i| DVec3::new(f64::from(i) * 0.37, -50.0, 9.0)));
     let folder = tempfile::tempdir().unwrap();
     let shelf = Shelf::new(folder.path()).unwrap();
-    let found = drape(&cloud(more), &|i| i < 3000, &SurfaceSettings::default(), (&shelf, 1 << 20)).unwrap();
+    let found =
+        drape(&cloud(more), &|i| i < 3000, &SurfaceSettings::default(), (&shelf, 1 << 20), &|_| Ok(())).unwrap();
     let (expected, figures) = draped(&points, &SurfaceSettings::default(), 1 << 17);
     assert_eq!((found.figures.triangles, found.figures.skipped), (expected.len() as u64, 500));
     assert_eq!(found.figures.spacing_m, figures.spacing_m);
@@ -195,7 +198,9 @@ fn a_cloud_without_a_surface_is_refused_by_what_it_lacks() {
     let refusal = |points: Vec<DVec3>| {
         let folder = tempfile::tempdir().unwrap();
         let shelf = Shelf::new(folder.path()).unwrap();
-        drape(&cloud(points), &|_| true, &SurfaceSettings::default(), (&shelf, 1 << 20)).unwrap_err().to_string()
+        drape(&cloud(points), &|_| true, &SurfaceSettings::default(), (&shelf, 1 << 20), &|_| Ok(()))
+            .unwrap_err()
+            .to_string()
     };
     let line = |n: u32| (0..n).map(|i| DVec3::new(f64::from(i), 2.0 * f64::from(i), 0.0)).collect::<Vec<_>>();
     assert!(refusal(line(2)).contains("2 of the 2 points"));
