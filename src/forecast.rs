@@ -51,6 +51,10 @@ pub enum ForecastError {
     },
 }
 
+/// Bytes on disk for each point of a cloud while it gets its surface: the point in each block that needs it, about
+/// one and a half, and two triangles.
+const SURFACE_DISK_BYTES: u64 = 48 + 24;
+
 fn mebibytes(bytes: u64) -> u64 {
     bytes.div_ceil(1 << 20)
 }
@@ -108,7 +112,8 @@ pub fn index_room(reach: &Reach, room: BuildRoom, welded_bytes: u64) -> Result<B
 /// # Errors
 /// The disk has less.
 pub fn disk(reach: &Reach, room: BuildRoom, folder: &str, free: Option<u64>) -> Result<u64, ForecastError> {
-    let needed = disk_bytes(reach.vertices(), triangles_to_expect(reach), reach.full_color(), room.bytes);
+    let index = disk_bytes(reach.vertices(), triangles_to_expect(reach), reach.full_color(), room.bytes);
+    let needed = index + if reach.is_cloud() { reach.vertices() * SURFACE_DISK_BYTES } else { 0 };
     match free {
         Some(free) if free < needed => Err(ForecastError::Disk { folder: folder.to_owned(), needed, free }),
         _ => Ok(needed),

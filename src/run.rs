@@ -110,6 +110,8 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     warnings.iter().for_each(|w| progress.warn(w));
     let mut findings = work.begin(&reach, settings, job.resume)?;
 
+    check_labels(&reach, settings)?;
+
     // index
     let room = forecast::room(&reach, memory)?;
     let budget = (room.bytes, forecast::fixed_bytes(&reach));
@@ -130,7 +132,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
             let room = forecast::index_room(&reach, room, surface.welded_bytes())?;
             let index = make_index(surface.surface(), &work, room, &crew, progress)?;
             work.note_weld(surface.weld_facts())?;
-            surface.figures().map_or(Ok(()), |figures| work.note_figures(&figures))?;
+            work.note_figures(surface.figures().as_ref())?;
             index
         }
     };
@@ -223,7 +225,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
         mesh: labelled.then_some(&mesh),
         cloud: settings.output.labelled_cloud.then_some(&reach),
     };
-    let files = write(&folder, &results, progress, control)?;
+    let files = crew.pool.install(|| write(&folder, &results, progress, control))?;
     if lost.is_empty() {
         drop((index, curvature, findings));
         work.finish();
@@ -327,6 +329,11 @@ fn check_outputs(reach: &Reach, index: &Index, settings: &Settings) -> Result<()
     if settings.raster.cell_m > 0.0 {
         RasterGrid::new(reach.frame(), &index.scale, settings.raster.cell_m)?;
     }
+    Ok(())
+}
+
+/// Refuses labels that cannot be written before anything is worked.
+fn check_labels(reach: &Reach, settings: &Settings) -> Result<(), Error> {
     if settings.output.labelled_cloud && !reach.is_cloud() {
         return Err(WriteError::NoCloud.into());
     }

@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::forecast;
-use crate::open::{DrapedCloud, Reach, Surface};
+use crate::open::{DrapedCloud, OpenError, Reach, Surface};
 use crate::pipeline::{Control, return_free_memory};
 use crate::progress::{Progress, Unit};
 use crate::settings::Settings;
@@ -17,6 +17,19 @@ pub enum WholeSurface<'a> {
     Mesh(Welded<'a>, Option<WeldFacts>),
     /// Of point clouds, and what became of their points.
     Cloud(DrapedCloud<'a>, DrapeFigures),
+}
+
+/// Coordinates that step by more than this part of the distance between points are no places of points any more.
+const COARSEST_STEP_IN_SPACINGS: f64 = 0.5;
+
+fn check_steps(reach: &Reach, spacing_m: f64) -> Result<(), OpenError> {
+    for file in reach.files() {
+        let step_m = file.coordinate_step().unwrap_or(0.0) * reach.frame().metres_per_input_unit;
+        if step_m > COARSEST_STEP_IN_SPACINGS * spacing_m {
+            return Err(OpenError::CloudStep { path: file.path().display().to_string(), step_m, spacing_m });
+        }
+    }
+    Ok(())
 }
 
 /// Triangles that a cloud will have at most: each point has two.
@@ -49,6 +62,7 @@ impl<'a> WholeSurface<'a> {
         reach.release();
         return_free_memory();
         progress.end();
+        check_steps(reach, draped.figures.spacing_m)?;
         Ok(WholeSurface::Cloud(DrapedCloud::new(reach, &draped.triangles, draped.wide)?, draped.figures))
     }
 

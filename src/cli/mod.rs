@@ -35,8 +35,9 @@ What is written to OUT:
   grain_size.tif     D16, D50, D84, D90, mean b axis, count, cover (Cloud-Optimised GeoTIFF)
   summary.json       counts and percentiles of the whole survey
   run.json           version, settings, inputs, warnings, lost tiles, CPU time of each stage, peak memory
-  labelled_mesh.ply  with --labelled-mesh: the input with a grain_id for each face
-  labelled_cloud.laz with --labelled-cloud: the input points with a grain_id for each
+  labelled_mesh.ply  with --labelled-mesh: the input, or the surface of a cloud, with a grain_id for each face
+  labelled_cloud.laz with --labelled-cloud: the input points with a grain_id for each, -1 in no grain (also for points
+                     at the very place of another one); of one LAS file in its own coordinates, else on the map
 
 The result does not depend on --tile-size, --threads and --memory.";
 

@@ -18,6 +18,10 @@ pub(super) fn stated_systems(files: &[SurveyFile]) -> Vec<CrsCandidate> {
 
 /// Heights in another unit than the plan would stretch every grain.
 pub(super) fn check_heights(files: &[SurveyFile], georeference: &Georeference) -> Result<(), OpenError> {
+    // Who names another system knows better than the header.
+    if !georeference.crs_is_of_header {
+        return Ok(());
+    }
     let plan_m = georeference.metres_per_map_unit;
     for file in files {
         if let Some(CloudCrs::Stated { definition, height_unit_m: Some(height_m) }) =

@@ -6,7 +6,7 @@
 #[allow(missing_docs, reason = "each variant's message names every field")]
 pub enum OpenError {
     /// No input was named.
-    #[error("no input file was given\nhelp: name one or several PLY meshes")]
+    #[error("no input file was given\nhelp: name one or several PLY meshes, or LAS, LAZ or PLY clouds")]
     NoFiles,
     /// The path leads nowhere.
     #[error("{path}: there is no such file\nhelp: check the path; a relative path starts at the working directory")]
@@ -60,8 +60,8 @@ pub enum OpenError {
 
     /// The first line is not `ply`.
     #[error(
-        "{path}: is not a PLY file: it starts with `{start}`, not with a line `ply`\nhelp: this version reads PLY \
-         meshes; export the mesh as binary PLY, for instance from CloudCompare or MeshLab"
+        "{path}: is not a PLY file: it starts with `{start}`, not with a line `ply`\nhelp: meshes are \
+         read from PLY, clouds from PLY, LAS and LAZ; export the mesh as binary PLY, for instance from CloudCompare or MeshLab"
     )]
     NotPly { path: String, start: String },
     /// The header does not end.
@@ -87,6 +87,13 @@ pub enum OpenError {
          free some space there, or set TMPDIR to a folder with room for about the file's size"
     )]
     Scratch { path: String, folder: String, source: std::io::Error },
+    /// Points on a lattice that is coarser than they lie apart.
+    #[error(
+        "{path}: coordinates step by {step_m:.3e} m, and points lie {spacing_m:.3e} m apart: their places are destroyed\nhelp: \
+         export it again with finer steps (LAS: a smaller scale; PLY: double, or shifted to small coordinates with the shift \
+         given as --offset or in an --offset-file)"
+    )]
+    CloudStep { path: String, step_m: f64, spacing_m: f64 },
     /// The triangles of a cloud cannot be read again.
     #[error(
         "the surface of the cloud cannot be mapped: {source}\nhelp: give the process more address space (ulimit -v)"

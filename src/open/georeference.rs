@@ -211,6 +211,7 @@ impl SideFiles {
             input_unit,
             metres_per_input_unit,
             input_unit_from: unit_from,
+            crs_is_of_header: named.as_ref().is_some_and(|n| matches!(n.source, CrsSource::Header(_))),
             reference: named.map(|n| n.reference),
             notes,
         })
@@ -278,6 +279,9 @@ pub struct Georeference {
     pub metres_per_input_unit: f64,
     /// Who named the unit of the input.
     pub input_unit_from: &'static str,
+    /// Whether it is the header of an input that named the CRS.
+    #[serde(skip)]
+    pub(super) crs_is_of_header: bool,
     /// The system itself.
     #[serde(skip)]
     pub(super) reference: Option<GeoReference>,

@@ -54,5 +54,6 @@ pub use reach::Reach;
 pub use scalar::Scalar;
 pub use surface::{MemorySurface, Surface};
 pub use survey_file::{Fingerprint, SurveyFile};
+pub(crate) use vertices::SKIPPED;
 pub use vertices::ScalarProperty;
 pub use warning::Warning;

@@ -13,7 +13,7 @@ const COLOR_NAMES: [[&str; 3]; 3] =
     [["red", "green", "blue"], ["diffuse_red", "diffuse_green", "diffuse_blue"], ["r", "g", "b"]];
 pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
 /// The byte of a decoded cloud that is not 0 for points that are to be left out.
-pub(super) const SKIPPED: &str = "gravelometer_skipped";
+pub(crate) const SKIPPED: &str = "gravelometer_skipped";
 
 /// A number of a vertex record.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -2,6 +2,7 @@
 
 use crate::open::Reach;
 use crate::settings::Settings;
+use crate::triangulate::METHOD;
 use serde_json::{Map, Value};
 use twox_hash::XxHash3_64;
 
@@ -37,6 +38,7 @@ impl Identity {
         names.insert("origin, input units".into(), format!("{:?}", frame.origin_input).into());
         let mut identity = Identity(names);
         if reach.is_cloud() {
+            identity.0.insert("method of the surface".into(), METHOD.into());
             identity.add("surface", serde_json::json!(settings.surface));
         }
         identity
@@ -51,8 +53,9 @@ impl Identity {
     /// With what the grains of a tile depend on as well.
     pub(super) fn and_grains(mut self, settings: &Settings, outline_step_m: f64) -> Identity {
         self.add("segment", serde_json::json!(settings.segment));
-        self.0.insert("output.labelled_mesh".into(), settings.output.labelled_mesh.into());
-        self.0.insert("output.labelled_cloud".into(), settings.output.labelled_cloud.into());
+        // Both need the triangles of grains.
+        let labelled = settings.output.labelled_mesh || settings.output.labelled_cloud;
+        self.0.insert("labelled".into(), labelled.into());
         self.0.insert("step of outlines, metres".into(), outline_step_m.to_string().into());
         self
     }

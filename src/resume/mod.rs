@@ -205,11 +205,11 @@ impl WorkFolder {
         self.shelf.inner(INDEX)
     }
 
-    /// Notes what became of the points of a cloud, for runs that use its index again.
+    /// Notes what became of the points of a cloud, if it was one, for runs that use its index again.
     ///
     /// # Errors
     /// The disk says no.
-    pub fn note_figures(&self, figures: &DrapeFigures) -> Result<(), StoreError> {
+    pub fn note_figures(&self, figures: Option<&DrapeFigures>) -> Result<(), StoreError> {
         self.shelf.inner(INDEX)?.put(FIGURES, serde_json::json!(figures).to_string().as_bytes())
     }
 

@@ -8,9 +8,6 @@ use std::ops::Range;
 /// triangles have the same numbers in every run.
 pub(super) const MOST_POINTS: u64 = 1 << 17;
 
-/// Points of a block with its halo, in eighths of those within.
-const HALO_FACTOR_EIGHTHS: u64 = 12;
-
 /// A block of cells.
 pub(super) struct Block {
     pub(super) columns: Range<u32>,
@@ -124,37 +121,31 @@ impl Blocks {
         self.nodes.len() - 1
     }
 
-    /// Points of the largest block and its halo, about.
+    /// Points of the largest block and all that it needs around it, at most.
     pub(super) fn largest_points(&self, density: &Density) -> u64 {
         let points = |block: &Block| -> u64 {
-            let cells = block.rows.clone().flat_map(|row| block.columns.clone().map(move |column| [column, row]));
+            let halo_m = self.halo_spacings * block.spacing_m;
+            let [columns, rows] = density.grown(&block.columns, &block.rows, halo_m);
+            let cells = rows.flat_map(|row| columns.clone().map(move |column| [column, row]));
             cells.map(|cell| u64::from(density.count(cell))).sum()
         };
-        self.blocks.iter().map(points).max().unwrap_or(0).max(1) * HALO_FACTOR_EIGHTHS / 8
+        self.blocks.iter().map(points).max().unwrap_or(0).max(1)
     }
 
     /// Hands the blocks to `take` that a point is needed in.
     pub(super) fn around(&self, p: DVec3, mut take: impl FnMut(usize)) {
-        let mut waiting = [0usize; 64];
-        let mut n = 0;
-        if self.top < self.nodes.len() {
-            (waiting[0], n) = (self.top, 1);
+        self.below(self.top, p, &mut take);
+    }
+
+    fn below(&self, node: usize, p: DVec3, take: &mut impl FnMut(usize)) {
+        let Some(node) = self.nodes.get(node) else { return };
+        let [low, high] = node.sides;
+        if p.x < low[0] || p.x > high[0] || p.y < low[1] || p.y > high[1] {
+            return;
         }
-        while n > 0 {
-            n -= 1;
-            let node = &self.nodes[waiting[n]];
-            let [low, high] = node.sides;
-            if p.x < low[0] || p.x > high[0] || p.y < low[1] || p.y > high[1] {
-                continue;
-            }
-            match node.part {
-                Part::Block(block) => take(block as usize),
-                // Every cut halves columns or rows, of which there are fewer than 2^24 each: no path is longer than 48.
-                Part::Halves([a, b]) => {
-                    (waiting[n], waiting[n + 1]) = (b, a);
-                    n += 2;
-                }
-            }
+        match node.part {
+            Part::Block(block) => take(block as usize),
+            Part::Halves(halves) => halves.into_iter().for_each(|half| self.below(half, p, take)),
         }
     }
 }

@@ -16,6 +16,8 @@ const POINTS_PER_CELL: u64 = 8;
 const MOST_CELLS: f64 = 8_388_608.0;
 /// Points by which a square is judged: so many that a wall in it, which has many points in little plan, does not tell.
 const ENOUGH: u32 = 1024;
+/// Nor for less than this part of it: a high wall has many points in little plan.
+const NARROWEST: f64 = 0.75;
 /// The spacing is nowhere taken for more than so many times that of the whole survey: stray points far from one another
 /// are no surface.
 const WIDEST: f64 = 8.0;
@@ -146,12 +148,12 @@ impl Density {
 
     /// Spacing of the points around a cell, metres.
     pub(super) fn spacing_m(&self, [column, row]: [u32; 2]) -> f64 {
-        let widest_m = WIDEST * self.typical_m;
+        let (narrowest_m, widest_m) = (NARROWEST * self.typical_m, WIDEST * self.typical_m);
         for (up, level) in self.levels.iter().enumerate() {
             let n = level.count[(row >> up) as usize * level.columns as usize + (column >> up) as usize];
             if n >= ENOUGH || up + 1 == self.levels.len() {
                 let side_m = self.cell_m * (1u64 << up) as f64;
-                return (side_m * side_m / f64::from(n.max(1))).sqrt().min(widest_m);
+                return (side_m * side_m / f64::from(n.max(1))).sqrt().clamp(narrowest_m, widest_m);
             }
         }
         widest_m

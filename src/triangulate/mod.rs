@@ -31,6 +31,8 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use umbrella::{Cell, ROUNDS, agreed};
 
+/// Which surface this is: another number wherever a change gives the same points other triangles.
+pub const METHOD: u32 = 2;
 /// Neighbours of a point that are looked at.
 const AROUND: usize = 32;
 /// How far they may be, in spacings of the points in plan: more than on level ground, for on steep ground points lie
@@ -43,8 +45,10 @@ const COVER_REACH: f64 = 1.5;
 const COVER_STEEPNESS: f64 = 5.67;
 /// How long a side of a triangle may be.
 const LONGEST: f64 = 4.0;
-/// What may change a triangle lies so far around it: the triangles next to it, and those next to them, round by round.
-const TRIANGLES_REACH: f64 = LONGEST * (1 + ROUNDS.len()) as f64;
+/// What may change a triangle lies so far around its first corner. Its corners are a side away. In each round it may be
+/// beaten by one that shares a side with it, if that one fits; and whether it fits is a matter of one that shares a side
+/// with it, taken in the round before, or agreed on by all its corners.
+const TRIANGLES_REACH: f64 = LONGEST * (1 + 2 * ROUNDS.len()) as f64;
 /// And what may change the side to which the planes of their corners face.
 const FACING_REACH: f64 = TRIANGLES_REACH + TURN_REACH * TURNS as f64;
 /// And the points that these planes are fitted to.
@@ -78,6 +82,18 @@ pub enum DrapeError {
         /// Their usual distance, metres.
         typical_m: f64,
     },
+    /// Too many points in one block.
+    #[error(
+        "{points} points of the cloud must be looked at together, which takes {} MiB of the {} MiB that there are for it: points are crowded in one place beside others that lie far apart\nhelp: give more --memory, or thin the cloud to an even distance, for instance with Edit > Subsample in CloudCompare", needed >> 20, room >> 20
+    )]
+    Crowded {
+        /// Points of the block and around it.
+        points: u64,
+        /// Memory for them, bytes.
+        needed: u64,
+        /// Memory that there is, bytes.
+        room: u64,
+    },
     /// Who was told of the progress did not want more.
     #[error("the triangulation was stopped")]
     Stopped,
@@ -95,6 +111,8 @@ pub struct DrapeFigures {
     pub skipped: u64,
     /// Points at the very place of another one.
     pub same_place: u64,
+    /// Points on steep or covered faces of which nothing around tells which side is the outer one.
+    pub side_unknown: u64,
     /// Triangles of the surface.
     pub triangles: u64,
     /// Usual distance of neighbouring points, metres: the side of the square that one has.
@@ -141,6 +159,7 @@ struct Piece {
     triangles: Vec<[u64; 3]>,
     points: u64,
     same_place: u64,
+    side_unknown: u64,
 }
 
 /// Lays a surface over the points that are to be kept, in about `room` bytes, on all threads of the pool. `tell` hears from
@@ -169,9 +188,14 @@ fn drape_in_blocks(
 ) -> Result<Draped, DrapeError> {
     let (density, kept) = Density::of(cloud, keep)?;
     let blocks = Blocks::cut(&density, most_points, HALO);
-    let scatter = scatter(cloud, keep, &blocks, (shelf, room / WAITING_SHARE))?;
     let largest = blocks.largest_points(&density);
-    let together = (room / 2 / (WORKING_BYTES * largest)).clamp(1, 4 * rayon::current_num_threads() as u64);
+    let needed = WORKING_BYTES * largest;
+    if needed > room || largest > u64::from(u32::MAX) {
+        return Err(DrapeError::Crowded { points: largest, needed, room });
+    }
+    let waiting = (room / WAITING_SHARE).min(room - needed);
+    let scatter = scatter(cloud, keep, &blocks, (shelf, waiting))?;
+    let together = ((room - waiting) / needed).clamp(1, 4 * rayon::current_num_threads() as u64);
     let (file, path) = shelf.scratch("surface")?;
     let wide = cloud.vertices() > u64::from(u32::MAX);
     let mut to = BufWriter::with_capacity(1 << 18, file);
@@ -191,6 +215,7 @@ fn drape_in_blocks(
         for piece in pieces {
             tell(piece.points)?;
             figures.same_place += piece.same_place;
+            figures.side_unknown += piece.side_unknown;
             figures.triangles += piece.triangles.len() as u64;
             for number in piece.triangles.as_flattened() {
                 let bytes = number.to_le_bytes();
@@ -278,8 +303,9 @@ fn piece(mut sites: Vec<Site>, density: &Density, block: &Block, gap_spacings: f
         }
     }
     let turned = facing.turn();
+    let side_unknown = facing.open().filter(|&point| is_ours(&sites[point])).count() as u64;
     drop((near, facing));
     let ours = agreed(&sites, proposed, &turned).into_iter().filter(|corners| is_ours(&sites[corners[0] as usize]));
     let triangles = ours.map(|corners| corners.map(|v| sites[v as usize].input)).collect();
-    Piece { triangles, points, same_place }
+    Piece { triangles, points, same_place, side_unknown }
 }

@@ -57,6 +57,11 @@ impl Facing {
         normal
     }
 
+    /// Points whose side is still open.
+    pub(super) fn open(&self) -> impl Iterator<Item = usize> + '_ {
+        self.open.iter().map(|&point| point as usize).filter(|&point| !self.known[point])
+    }
+
     /// Turns open planes to the side to which those around them face, from those that clearly face up. Returns which
     /// were turned over.
     pub(super) fn turn(&mut self) -> Vec<bool> {

@@ -104,14 +104,30 @@ fn blocks_do_not_change_the_surface() {
     points.iter_mut().step_by(7).for_each(|p| p.z += 0.004);
     let roof: Vec<DVec3> = points.iter().filter(|p| p.x < 1.0).map(|p| *p + DVec3::new(0.001, 0.002, 0.2)).collect();
     points.extend(roof);
-    let settings = SurfaceSettings::default();
-    let (whole, figures) = draped(&points, &settings, 1 << 17);
-    assert!(is_manifold(&whole) && whole.len() as u64 > points.len() as u64, "{figures:?}");
-    for most in [333, 1500, 6000] {
-        let (triangles, of_blocks) = draped(&points, &settings, most);
-        assert_eq!(of_blocks, figures, "blocks of {most}");
-        assert_eq!(places(&points, &triangles), places(&points, &whole), "blocks of {most}");
+    for gap_spacings in [2.0, 3.0] {
+        blocks_agree(&points, &SurfaceSettings { gap_spacings });
     }
+}
+
+/// Whatever the size of blocks.
+fn blocks_agree(points: &[DVec3], settings: &SurfaceSettings) {
+    let (whole, figures) = draped(points, settings, 1 << 17);
+    assert!(is_manifold(&whole) && whole.len() > points.len(), "{figures:?}");
+    for most in [333, 1500, 6000] {
+        let (triangles, of_blocks) = draped(points, settings, most);
+        assert_eq!(of_blocks, figures, "blocks of {most}");
+        assert_eq!(places(points, &triangles), places(points, &whole), "blocks of {most}");
+    }
+}
+
+#[test]
+fn blocks_do_not_change_the_surface_where_density_jumps_and_noise_is_as_coarse_as_points_lie_apart() {
+    let mut next = random(7);
+    // Four hundred times as many points in a corner as elsewhere, all with heights that say little.
+    let sparse = (0..1500).map(|_| [next() * 3.0, next() * 2.0, next() * 0.06]).collect::<Vec<_>>();
+    let dense = (0..12_000).map(|_| [next() * 0.35, next() * 0.35, next() * 0.003]).collect::<Vec<_>>();
+    let points: Vec<DVec3> = sparse.into_iter().chain(dense).map(DVec3::from_array).collect();
+    blocks_agree(&points, &SurfaceSettings { gap_spacings: 3.0 });
 }
 
 #[test]

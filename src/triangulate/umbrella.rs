@@ -33,7 +33,7 @@ pub(super) fn agreed(sites: &[Site], mut proposed: Vec<Corners>, turned: &[bool]
     proposed.sort_unstable();
     let (mut all, mut rest) = (Vec::with_capacity(proposed.len() / 3), Vec::new());
     for same in proposed.chunk_by(|a, b| a == b) {
-        if same.len() == 3 { all.push(same[0]) } else { rest.push((same[0], same.len() as u8)) }
+        if same.len() >= 3 { all.push(same[0]) } else { rest.push((same[0], same.len() as u8)) }
     }
     drop(proposed);
     // Only sides that somebody may still want matter.

@@ -42,10 +42,18 @@ pub(super) fn write(file: &Pending, results: &Results, mesh: &dyn MeshSource) ->
     let (labels, _) = vertex_labels(mesh, &triangle_labels(results, mesh)?)?;
     let label = |point: u64| labels[point as usize];
     match reach.files() {
-        [only] if only.is_las() => write_las(file, only.path(), &label),
+        [only] if only.is_las() => {
+            let label = |point: u64| labels.get(point as usize).copied().unwrap_or(NONE);
+            let written = write_las(file, only.path(), &label)?;
+            if written.points == reach.vertices() { Ok(written) } else { Err(changed(file)) }
+        }
         _ => write_vertices(file, reach, 0..reach.vertices(), &label),
     }
     .map(|_| ())
+}
+
+fn changed(file: &Pending) -> WriteError {
+    file.error("write the labelled cloud", std::io::Error::other("the input has other points than when the run began"))
 }
 
 /// Writes the points of a LAS or LAZ file again. `label` gives the grain of a point by its number in the file, or -1.
@@ -109,7 +117,9 @@ pub(crate) fn write_vertices(
     let number = if reach.has_colors() { 7 } else { 6 };
     let format = Format::new(number)
         .map_err(|e| file.error("write the labelled cloud", std::io::Error::other(e.to_string())))?;
-    let wkt = frame.crs.as_ref().map(|crs| variable_record(WKT_RECORD, "", format!("{}\0", crs.wkt).as_bytes()));
+    // A longer text has no room in a record.
+    let crs = frame.crs.as_ref().filter(|crs| crs.wkt.len() < usize::from(u16::MAX));
+    let wkt = crs.map(|crs| variable_record(WKT_RECORD, "", format!("{}\0", crs.wkt).as_bytes()));
     let records = wkt.iter().map(Vec::as_slice).collect();
     let header = header(frame, origin, step, format.len(), number);
     let mut to = LazStream::begin(file, Declared { header, minor: 4, format, records, described: &[] })?;

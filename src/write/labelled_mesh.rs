@@ -14,7 +14,7 @@ const NONE: i32 = -1;
 
 /// A mesh that can be read again, vertex by vertex and face by face. Counts have been checked against the
 /// size of the file.
-pub trait MeshSource {
+pub trait MeshSource: Sync {
     /// Number of vertices.
     fn vertices(&self) -> u64;
     /// Number of faces, polygons of any size.

@@ -65,7 +65,7 @@ pub struct Results<'a> {
     /// What else belongs into `run.json`: input files, what was refused or lost.
     pub facts: &'a serde_json::Value,
     /// What the run has cost so far, for `run.json`: an object, asked for when that file is written.
-    pub costs: &'a dyn Fn() -> serde_json::Value,
+    pub costs: &'a (dyn Fn() -> serde_json::Value + Sync),
     /// The input's surface, if it or the points are to be written again with labels.
     pub mesh: Option<&'a dyn MeshSource>,
     /// The points, if they are to be written again with labels.

@@ -1,7 +1,7 @@
 //! A survey as the labelled mesh reads it again: file by file, record by record.
 
 use super::MeshSource;
-use crate::open::{DrapedCloud, Reach, ScalarProperty, Surface, SurveyFile};
+use crate::open::{DrapedCloud, Reach, SKIPPED, ScalarProperty, Surface, SurveyFile};
 
 /// A survey with the vertex properties that all of its files have, with the same type, in the order of
 /// the first file.
@@ -21,7 +21,8 @@ impl<'a> WholeMesh<'a> {
             file.vertex_properties().iter().find(|p| p.name == wanted.name && p.scalar == wanted.scalar)
         };
         let properties: Vec<&ScalarProperty> = reach.files().first().map_or(Vec::new(), |first| {
-            let everywhere = |p: &&ScalarProperty| reach.files().iter().all(|f| find(f, p).is_some());
+            let everywhere =
+                |p: &&ScalarProperty| p.name != SKIPPED && reach.files().iter().all(|f| find(f, p).is_some());
             first.vertex_properties().iter().filter(everywhere).collect()
         });
         let place = |p: &ScalarProperty| (p.offset, p.scalar.size());
