@@ -1,10 +1,64 @@
 //! What belongs into `run.json` beside settings and costs.
 
-use crate::index::Index;
+use crate::index::{Index, Scale};
 use crate::open::Reach;
 use crate::pipeline::LostJob;
+use crate::settings::Settings;
+use crate::stitch::Catalogue;
 use crate::tile::Plan;
+use crate::triangulate::DrapeFigures;
 use std::path::Path;
+
+/// More triangles than this part of all have no corner in common with another: the faces are not joined.
+const LOOSE_SHARE: f64 = 0.9;
+/// More grains than this part of all lie at an edge of the surface.
+const EDGE_SHARE: f64 = 0.9;
+
+/// What is odd about a result without being wrong, each with what to do.
+pub fn oddities(catalogue: &Catalogue, scale: &Scale, settings: &Settings) -> Vec<String> {
+    let mut odd = Vec::new();
+    // Of a closed or open surface there are two triangles for each vertex; of loose ones, a third.
+    if scale.vertices as f64 > 3.0 * LOOSE_SHARE * scale.triangles as f64 {
+        odd.push(format!(
+            "the {} triangles have {} vertices: nearly every triangle has its own, so none is joined to another and no grain can be found\nhelp: join them, for instance in MeshLab with Filters > Cleaning and Repairing > Merge Close Vertices",
+            scale.triangles, scale.vertices
+        ));
+    } else if catalogue.grains.is_empty() {
+        odd.push(format!(
+            "no grain was found among {} triangles with a mean edge of {:.3e} m, a smallest grain of {:.3e} m² and a widest of {} m ({} wider bodies)\nhelp: `gravelometer inspect` says what the survey can show; look at --unit, --min-grain-area and --max-grain",
+            scale.triangles,
+            scale.mean_edge_m,
+            settings.segment.min_grain_area_m2,
+            settings.segment.max_grain_m,
+            catalogue.oversize.len()
+        ));
+    }
+    let at_edges = catalogue.grains.iter().filter(|g| g.grain.touches_edge).count();
+    if at_edges as f64 > EDGE_SHARE * catalogue.grains.len() as f64 {
+        odd.push(format!(
+            "{at_edges} of {} grains touch an edge of the surface, so their sizes are lower bounds: the surface has many holes",
+            catalogue.grains.len()
+        ));
+    }
+    odd
+}
+
+/// What is odd about a cloud and what became of it, each with what to do.
+pub fn oddities_of_cloud(figures: &DrapeFigures) -> Vec<String> {
+    let DrapeFigures { points, same_place, side_unknown, .. } = *figures;
+    let mut odd = Vec::new();
+    if same_place > points / 20 {
+        odd.push(format!(
+            "{same_place} of {points} points lie at the very place of another one: files may hold the same points, or coordinates may be rounded"
+        ));
+    }
+    if side_unknown > points / 50 {
+        odd.push(format!(
+            "of {side_unknown} of {points} points nothing around tells which side of the surface is the outer one (high walls, wide overhangs): grains there may be wrong"
+        ));
+    }
+    odd
+}
 
 /// Inputs, warnings, lost tiles, and what the survey is made of.
 pub fn facts(reach: &Reach, index: &Index, plan: &Plan, warnings: &[String], lost: &[LostJob]) -> serde_json::Value {

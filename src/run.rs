@@ -4,7 +4,7 @@ use crate::costs::{Costs, Meter};
 use crate::curvature::{InstructionSet, Stencil};
 use crate::cuts::{GrainCores, curvature_core, grain_cores};
 use crate::error::Error;
-use crate::facts::facts;
+use crate::facts::{facts, oddities, oddities_of_cloud};
 use crate::forecast;
 use crate::index::{BuildRoom, Index};
 use crate::measure::Wanted;
@@ -198,6 +198,12 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let (catalogue, tiles) = stitch(findings.all(&plan)?, touch_steps);
 
     // statistics and write
+    let figures = work.figures();
+    let odd = figures.iter().flat_map(oddities_of_cloud).chain(oddities(&catalogue, &index.scale, settings));
+    odd.for_each(|odd| {
+        progress.warn(&odd);
+        warnings.push(odd);
+    });
     let mut facts = facts(&reach, &index, &plan, &warnings, &lost);
     let segmented_per_triangle = segmented_per_triangle(&tiles, probe.segmented);
     facts["segmented_per_triangle"] = segmented_per_triangle.into();
@@ -205,7 +211,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     facts["curvature_per_triangle"] = curvature_per_triangle.into();
     facts["identity"] = whole_identity(&reach, settings).into();
     facts["weld"] = serde_json::json!(weld);
-    facts["surface"] = serde_json::json!(work.figures());
+    facts["surface"] = serde_json::json!(figures);
     if labelled && reach.is_cloud() && whole.is_none() {
         whole = Some(surface(&work.surface_shelf()?)?);
     }

@@ -63,6 +63,10 @@ impl<'a> WholeSurface<'a> {
         return_free_memory();
         progress.end();
         check_steps(reach, draped.figures.spacing_m)?;
+        if settings.input.unit == crate::settings::Unit::Auto {
+            let warning = reach.looks_like_millimetres(draped.figures.spacing_m);
+            warning.iter().for_each(|warning| progress.warn(&warning.to_string()));
+        }
         Ok(WholeSurface::Cloud(DrapedCloud::new(reach, &draped.triangles, draped.wide)?, draped.figures))
     }
 

@@ -258,16 +258,18 @@ impl Reach {
         }
     }
 
+    /// A warning if the survey, taken as metres, is rather one of millimetres.
+    pub fn looks_like_millimetres(&self, mean_edge_m: f64) -> Option<Warning> {
+        let (extent_m, path) = (self.plan_extent_m(), self.files.first()?.path.display().to_string());
+        let looks = LIKE_MILLIMETRES_M.iter().any(|&(edge, extent)| mean_edge_m >= edge && extent_m > extent);
+        looks.then_some(Warning::LooksLikeMillimetres { path, mean_edge_m, extent_m })
+    }
+
     fn warnings(&self, input: &InputSettings, mean_edge_m: Option<f64>) -> Vec<Warning> {
         let mut warnings = Vec::new();
         let name = |file: &SurveyFile| file.path.display().to_string();
-        if let (Some(first), Some(mean_edge_m)) = (self.files.first(), mean_edge_m)
-            && input.unit == Unit::Auto
-        {
-            let extent_m = self.plan_extent_m();
-            if LIKE_MILLIMETRES_M.iter().any(|&(edge, extent)| mean_edge_m >= edge && extent_m > extent) {
-                warnings.push(Warning::LooksLikeMillimetres { path: name(first), mean_edge_m, extent_m });
-            }
+        if input.unit == Unit::Auto {
+            warnings.extend(mean_edge_m.and_then(|mean_edge_m| self.looks_like_millimetres(mean_edge_m)));
         }
         let Georeference { offset_map_units: offset, .. } = self.georeference;
         if let Some(first) = self.files.first()

@@ -53,9 +53,8 @@ impl Identity {
     /// With what the grains of a tile depend on as well.
     pub(super) fn and_grains(mut self, settings: &Settings, outline_step_m: f64) -> Identity {
         self.add("segment", serde_json::json!(settings.segment));
-        // Both need the triangles of grains.
-        let labelled = settings.output.labelled_mesh || settings.output.labelled_cloud;
-        self.0.insert("labelled".into(), labelled.into());
+        self.0.insert("output.labelled_mesh".into(), settings.output.labelled_mesh.into());
+        self.0.insert("output.labelled_cloud".into(), settings.output.labelled_cloud.into());
         self.0.insert("step of outlines, metres".into(), outline_step_m.to_string().into());
         self
     }

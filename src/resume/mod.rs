@@ -210,7 +210,7 @@ impl WorkFolder {
     /// # Errors
     /// The disk says no.
     pub fn note_figures(&self, figures: Option<&DrapeFigures>) -> Result<(), StoreError> {
-        self.shelf.inner(INDEX)?.put(FIGURES, serde_json::json!(figures).to_string().as_bytes())
+        self.note(FIGURES, figures)
     }
 
     /// What became of the points of the cloud that was indexed.
@@ -224,7 +224,19 @@ impl WorkFolder {
     /// # Errors
     /// The disk says no.
     pub fn note_weld(&self, facts: Option<&WeldFacts>) -> Result<(), StoreError> {
-        self.shelf.inner(INDEX)?.put(WELD, serde_json::json!(facts).to_string().as_bytes())
+        self.note(WELD, facts)
+    }
+
+    /// Puts a note beside the index, or takes away that of another survey.
+    fn note(&self, name: &str, note: Option<&impl serde::Serialize>) -> Result<(), StoreError> {
+        let shelf = self.shelf.inner(INDEX)?;
+        match note {
+            Some(note) => shelf.put(name, serde_json::json!(note).to_string().as_bytes()),
+            None => {
+                shelf.remove(name);
+                Ok(())
+            }
+        }
     }
 
     /// What welding the files gave that were indexed; none of a single file.

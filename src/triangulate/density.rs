@@ -16,6 +16,12 @@ const POINTS_PER_CELL: u64 = 8;
 const MOST_CELLS: f64 = 8_388_608.0;
 /// Points by which a square is judged: so many that a wall in it, which has many points in little plan, does not tell.
 const ENOUGH: u32 = 1024;
+/// Points by which a square is judged where it is only about speed.
+const FEW: u32 = 16;
+/// Parts of the box along each axis in which strays are looked for.
+const PARTS: usize = 4096;
+/// One point in so many may be a stray.
+const STRAYS: u64 = 10_000;
 /// Nor for less than this part of it: a high wall has many points in little plan.
 const NARROWEST: f64 = 0.75;
 /// The spacing is nowhere taken for more than so many times that of the whole survey: stray points far from one another
@@ -30,6 +36,8 @@ pub(super) struct Density {
     levels: Vec<Level>,
     /// Spacing of evenly spread points where there are any, metres.
     pub(super) typical_m: f64,
+    /// What all spacings are multiplied by, because points are there several times.
+    wider: f64,
 }
 
 struct Level {
@@ -47,6 +55,7 @@ impl Density {
     /// No point is kept, or all are at one place in plan.
     pub(super) fn of(cloud: &dyn Surface, keep: Keep) -> Result<(Density, u64), DrapeError> {
         let (min, max, kept) = bounds(cloud, keep);
+        let (min, max) = without_strays(cloud, keep, (min, max, kept));
         let (width, height) = ((max[0] - min[0]).max(1e-9), (max[1] - min[1]).max(1e-9));
         if kept < 3 || (max[0] <= min[0] && max[1] <= min[1]) {
             return Err(DrapeError::TooFew { points: cloud.vertices(), kept });
@@ -58,7 +67,7 @@ impl Density {
         }
         let (columns, rows) = ((width / cell_m) as u32 + 1, (height / cell_m) as u32 + 1);
         let count: Vec<AtomicU32> = (0..columns as usize * rows as usize).map(|_| AtomicU32::new(0)).collect();
-        let mut density = Density { min, cell_m, levels: Vec::new(), typical_m: 0.0 };
+        let mut density = Density { min, cell_m, levels: Vec::new(), typical_m: 0.0, wider: 1.0 };
         density.levels.push(Level { columns, count: Vec::new() });
         each_kept(
             cloud,
@@ -122,7 +131,23 @@ impl Density {
     /// Lowest and highest corner of a block of cells, metres. Cells at the border hold what lies beyond them.
     pub(super) fn sides(&self, columns: &Range<u32>, rows: &Range<u32>) -> [[f64; 2]; 2] {
         let at = |axis: usize, cell: u32| self.min[axis] + f64::from(cell) * self.cell_m;
-        [[at(0, columns.start), at(1, rows.start)], [at(0, columns.end), at(1, rows.end)]]
+        // Cells at the border hold what lies beyond, however far.
+        let [all_columns, all_rows] = self.size();
+        let low = |axis, cell| if cell == 0 { f64::NEG_INFINITY } else { at(axis, cell) };
+        let high = |axis, cell, all| if cell == all { f64::INFINITY } else { at(axis, cell) };
+        let high = [high(0, columns.end, all_columns), high(1, rows.end, all_rows)];
+        [[low(0, columns.start), low(1, rows.start)], high]
+    }
+
+    /// Makes all spacings so many times wider.
+    pub(super) fn widen(&mut self, times: f64) {
+        self.wider *= times;
+        self.typical_m *= times;
+    }
+
+    /// Spacing of the points around a cell by the smallest square that holds some, metres: how dense it is there.
+    pub(super) fn finest_m(&self, cell: [u32; 2]) -> f64 {
+        self.square_m(cell, FEW).clamp(1e-9, self.spacing_m(cell))
     }
 
     /// A block of cells and what lies up to so far around it.
@@ -147,16 +172,23 @@ impl Density {
     }
 
     /// Spacing of the points around a cell, metres.
-    pub(super) fn spacing_m(&self, [column, row]: [u32; 2]) -> f64 {
+    pub(super) fn spacing_m(&self, cell: [u32; 2]) -> f64 {
         let (narrowest_m, widest_m) = (NARROWEST * self.typical_m, WIDEST * self.typical_m);
+        self.square_m(cell, ENOUGH).clamp(narrowest_m, widest_m)
+    }
+
+    /// Spacing of evenly spread points in the smallest square around a cell that holds so many, metres.
+    fn square_m(&self, [column, row]: [u32; 2], enough: u32) -> f64 {
+        let mut spacing_m = f64::INFINITY;
         for (up, level) in self.levels.iter().enumerate() {
             let n = level.count[(row >> up) as usize * level.columns as usize + (column >> up) as usize];
-            if n >= ENOUGH || up + 1 == self.levels.len() {
-                let side_m = self.cell_m * (1u64 << up) as f64;
-                return (side_m * side_m / f64::from(n.max(1))).sqrt().clamp(narrowest_m, widest_m);
+            let side_m = self.cell_m * (1u64 << up) as f64;
+            spacing_m = (side_m * side_m / f64::from(n.max(1))).sqrt() * self.wider;
+            if n >= enough {
+                break;
             }
         }
-        widest_m
+        spacing_m
     }
 }
 
@@ -186,6 +218,59 @@ pub(super) fn each_kept<S>(
     );
     match passed {
         Ok(()) => (),
+    }
+}
+
+/// The box in which nearly all points lie, where it is much smaller than that of all: stray points, however far, must not
+/// make the cells so large that nothing can be told apart.
+fn without_strays(
+    cloud: &dyn Surface,
+    keep: Keep,
+    (mut min, mut max, kept): ([f64; 2], [f64; 2], u64),
+) -> ([f64; 2], [f64; 2]) {
+    loop {
+        let width = [0, 1].map(|axis| max[axis] - min[axis]);
+        let whole = Mutex::new([vec![0u64; PARTS], vec![0u64; PARTS]]);
+        let part = |p: DVec3, axis: usize| {
+            ((p[axis] - min[axis]) / width[axis].max(1e-9) * PARTS as f64).clamp(0.0, PARTS as f64 - 1.0) as usize
+        };
+        each_kept(
+            cloud,
+            keep,
+            || [vec![0u64; PARTS], vec![0u64; PARTS]],
+            |counts, p| (0..2).for_each(|axis| counts[axis][part(p, axis)] += 1),
+            |counts| {
+                let mut whole = whole.lock().unwrap_or_else(PoisonError::into_inner);
+                for (all, of_thread) in whole.iter_mut().flatten().zip(counts.iter().flatten()) {
+                    *all += of_thread;
+                }
+            },
+        );
+        let counts = whole.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let mut smaller = false;
+        let (old_min, old_max) = (min, max);
+        for axis in 0..2 {
+            let edge = |counts: &mut dyn Iterator<Item = &u64>| {
+                let mut before = 0;
+                counts
+                    .take_while(|&&n| {
+                        before += n;
+                        before <= kept / STRAYS
+                    })
+                    .count() as f64
+            };
+            let first = edge(&mut counts[axis].iter());
+            let last = PARTS as f64 - edge(&mut counts[axis].iter().rev());
+            let (one, spare) = (width[axis] / PARTS as f64, 0.1 * (last - first) + 1.0);
+            if (last - first) * 2.0 < PARTS as f64 {
+                min[axis] = (old_min[axis] + (first - spare) * one).max(old_min[axis]);
+                max[axis] = (old_min[axis] + (last + spare) * one).min(old_max[axis]);
+                smaller |= max[axis] - min[axis] < 0.75 * width[axis];
+            }
+        }
+        if !smaller {
+            return (min, max);
+        }
     }
 }
 

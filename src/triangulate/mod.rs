@@ -53,6 +53,10 @@ const TRIANGLES_REACH: f64 = LONGEST * (1 + 2 * ROUNDS.len()) as f64;
 const FACING_REACH: f64 = TRIANGLES_REACH + TURN_REACH * TURNS as f64;
 /// And the points that these planes are fitted to.
 const HALO: f64 = FACING_REACH + REACH;
+/// Side of the squares in which neighbours are looked for, spacings.
+const SQUARE_SPACINGS: f64 = 2.0;
+/// More points than one in so many at the very place of another make all spacings too small: they are measured again.
+const MANY_AT_ONE_PLACE: u64 = 50;
 /// Memory for each point of a block while it is triangulated, bytes.
 const WORKING_BYTES: u64 = 250;
 /// Part of the room for points that wait for their block.
@@ -186,9 +190,29 @@ fn drape_in_blocks(
     (shelf, room, tell): (&Shelf, u64, Tell),
     most_points: u64,
 ) -> Result<Draped, DrapeError> {
-    let (density, kept) = Density::of(cloud, keep)?;
-    let blocks = Blocks::cut(&density, most_points, HALO);
-    let largest = blocks.largest_points(&density);
+    let (mut density, kept) = Density::of(cloud, keep)?;
+    let mut draped = drape_by(&density, kept, (cloud, keep), settings, (shelf, room, tell), most_points)?;
+    let alone = kept - draped.figures.same_place;
+    if draped.figures.same_place > kept / MANY_AT_ONE_PLACE {
+        density.widen((kept as f64 / alone as f64).sqrt());
+        draped = drape_by(&density, kept, (cloud, keep), settings, (shelf, room, &|_| tell(0)), most_points)?;
+    }
+    match draped.figures.triangles {
+        0 => Err(DrapeError::NoTriangles { kept, typical_m: density.typical_m }),
+        _ => Ok(draped),
+    }
+}
+
+fn drape_by(
+    density: &Density,
+    kept: u64,
+    (cloud, keep): (&dyn Surface, Keep),
+    settings: &SurfaceSettings,
+    (shelf, room, tell): (&Shelf, u64, Tell),
+    most_points: u64,
+) -> Result<Draped, DrapeError> {
+    let blocks = Blocks::cut(density, most_points, HALO);
+    let largest = blocks.largest_points(density);
     let needed = WORKING_BYTES * largest;
     if needed > room || largest > u64::from(u32::MAX) {
         return Err(DrapeError::Crowded { points: largest, needed, room });
@@ -209,7 +233,7 @@ fn drape_in_blocks(
     for wave in (0..blocks.blocks.len()).collect::<Vec<_>>().chunks(together as usize) {
         let work = |&i: &usize| {
             let sites: Vec<Site> = scatter.take(i)?.concat();
-            Ok(piece(sites, &density, &blocks.blocks[i], settings.gap_spacings))
+            Ok(piece(sites, density, &blocks.blocks[i], settings.gap_spacings))
         };
         let pieces = wave.par_iter().with_max_len(1).map(work).collect::<Result<Vec<_>, StoreError>>()?;
         for piece in pieces {
@@ -224,9 +248,6 @@ fn drape_in_blocks(
         }
     }
     let triangles = to.into_inner().map_err(|e| failed(e.into_error()))?;
-    if figures.triangles == 0 {
-        return Err(DrapeError::NoTriangles { kept, typical_m: density.typical_m });
-    }
     Ok(Draped { triangles, wide, figures })
 }
 
@@ -283,7 +304,9 @@ fn piece(mut sites: Vec<Site>, density: &Density, block: &Block, gap_spacings: f
         same_place += u64::from(same && is_ours(b));
         same
     });
-    let (near, mut facing) = (Near::new(&sites), Facing::new(sites.len()));
+    // Squares as most points want them.
+    let usual_m = sites.get(sites.len() / 2).map_or(1.0, |site| density.finest_m(density.cell_of(site.at)));
+    let (near, mut facing) = (Near::new(&sites, SQUARE_SPACINGS * usual_m), Facing::new(sites.len()));
     let (mut found, mut cell, mut proposed) = (Vec::new(), Cell::default(), Vec::new());
     for (point, site) in sites.iter().enumerate() {
         let distance_m = density.distance_m(site.at, &block.columns, &block.rows);

@@ -1,20 +1,19 @@
 //! The nearest points of every point, in space: exact, ties by place.
 
 use super::Site;
-use crate::geometry::{DVec3, PlanBox};
-
-/// Points of an average square, where the block is full.
-const POINTS_PER_SQUARE: f64 = 4.0;
+use crate::geometry::DVec3;
+use std::ops::Range;
 
 /// A point as a neighbour: squared distance (m²) and number.
 pub(super) type Neighbour = (f64, u32);
 
-/// Points by square in plan.
+/// Points by square in plan. Only squares with points take room: one point far away must not stretch them.
 pub(super) struct Near<'a> {
     sites: &'a [Site],
-    min: [f64; 2],
     side_m: f64,
-    size: [usize; 2],
+    /// Row and column of each square, ascending.
+    squares: Vec<(i32, i32)>,
+    /// First point of each square in `order`, with the end behind the last.
     start: Vec<u32>,
     order: Vec<u32>,
     /// Highest point of each square, metres.
@@ -22,41 +21,54 @@ pub(super) struct Near<'a> {
 }
 
 impl<'a> Near<'a> {
-    /// Sorts points into squares.
-    pub(super) fn new(sites: &'a [Site]) -> Near<'a> {
-        let mut sides = PlanBox::EMPTY;
-        sites.iter().for_each(|s| sides.include(s.at));
-        let width = |axis: usize| (sides.max[axis] - sides.min[axis]).max(1e-9);
-        let squares = (sites.len() as f64 / POINTS_PER_SQUARE).max(1.0);
-        let side_m = (width(0) * width(1) / squares).sqrt().max(width(0).max(width(1)) / squares);
-        let size = [0, 1].map(|axis| (width(axis) / side_m) as usize + 1);
-        let mut near = Near {
-            sites,
-            min: sides.min,
-            side_m,
-            size,
-            start: vec![0; size[0] * size[1] + 1],
-            order: Vec::new(),
-            highest: Vec::new(),
-        };
-        near.highest = vec![f64::NEG_INFINITY; size[0] * size[1]];
-        let of: Vec<usize> = sites.iter().map(|s| near.step(s.at.y, 1) * size[0] + near.step(s.at.x, 0)).collect();
-        of.iter().for_each(|&square| near.start[square + 1] += 1);
-        for i in 1..near.start.len() {
-            near.start[i] += near.start[i - 1];
+    /// Sorts points into squares of this side.
+    pub(super) fn new(sites: &'a [Site], side_m: f64) -> Near<'a> {
+        let mut near =
+            Near { sites, side_m, squares: Vec::new(), start: Vec::new(), order: Vec::new(), highest: Vec::new() };
+        let square = |&i: &u32| (near.step(sites[i as usize].at.y), near.step(sites[i as usize].at.x));
+        let mut order: Vec<((i32, i32), u32)> = (0..sites.len() as u32).map(|i| (square(&i), i)).collect();
+        order.sort_unstable();
+        for same in order.chunk_by(|a, b| a.0 == b.0) {
+            near.squares.push(same[0].0);
+            near.start.push(near.order.len() as u32);
+            near.order.extend(same.iter().map(|&(_, i)| i));
+            let heights = same.iter().map(|&(_, i)| sites[i as usize].at.z);
+            near.highest.push(heights.fold(f64::NEG_INFINITY, f64::max));
         }
-        let mut next = near.start.clone();
-        near.order = vec![0; sites.len()];
-        for (i, &square) in of.iter().enumerate() {
-            near.highest[square] = near.highest[square].max(sites[i].at.z);
-            near.order[next[square] as usize] = i as u32;
-            next[square] += 1;
-        }
+        near.start.push(near.order.len() as u32);
         near
     }
 
-    fn step(&self, x: f64, axis: usize) -> usize {
-        (((x - self.min[axis]) / self.side_m).max(0.0) as usize).min(self.size[axis] - 1)
+    fn step(&self, x: f64) -> i32 {
+        (x / self.side_m).floor() as i32
+    }
+
+    /// The squares with points that reach into a square of twice this side around a place, row by row.
+    fn around(&self, p: DVec3, radius_m: f64) -> impl Iterator<Item = Range<usize>> + '_ {
+        let (first, last) = (self.step(p.x - radius_m), self.step(p.x + radius_m));
+        let (south, north) = (self.step(p.y - radius_m), self.step(p.y + radius_m));
+        let mut at = self.squares.partition_point(|&square| square < (south, first));
+        std::iter::from_fn(move || {
+            // Rows without points are not visited.
+            loop {
+                let &(row, column) = self.squares.get(at)?;
+                if row > north {
+                    return None;
+                }
+                if column < first {
+                    at += self.squares[at..].partition_point(|&square| square < (row, first));
+                    continue;
+                }
+                if column > last {
+                    at += self.squares[at..].partition_point(|&square| square < (row + 1, first));
+                    continue;
+                }
+                let end = at + self.squares[at..].partition_point(|&square| square <= (row, last));
+                let run = at..end;
+                at = end;
+                return Some(run);
+            }
+        })
     }
 
     /// Puts up to `k` other points that are nearest to a point, and no further than `reach_m`, into `found`, nearest
@@ -84,28 +96,19 @@ impl<'a> Near<'a> {
     /// over distance: whether it is under an overhang, or on a wall below its rim.
     pub(super) fn is_covered(&self, point: usize, reach_m: f64, steepness: f64) -> bool {
         let p = self.sites[point].at;
-        let (first, last) = (self.step(p.x - reach_m, 0), self.step(p.x + reach_m, 0));
-        (self.step(p.y - reach_m, 1)..=self.step(p.y + reach_m, 1)).any(|row| {
-            (first..=last).map(|column| row * self.size[0] + column).filter(|&square| self.highest[square] > p.z).any(
-                |square| {
-                    let of_square = self.start[square] as usize..self.start[square + 1] as usize;
-                    self.order[of_square].iter().any(|&i| {
-                        let d = self.sites[i as usize].at - p;
-                        let away2 = d.x * d.x + d.y * d.y;
-                        d.z > 0.0 && away2 <= reach_m * reach_m && d.z * d.z > steepness * steepness * away2
-                    })
-                },
-            )
+        self.around(p, reach_m).flatten().filter(|&square| self.highest[square] > p.z).any(|square| {
+            self.order[self.start[square] as usize..self.start[square + 1] as usize].iter().any(|&i| {
+                let d = self.sites[i as usize].at - p;
+                let away2 = d.x * d.x + d.y * d.y;
+                d.z > 0.0 && away2 <= reach_m * reach_m && d.z * d.z > steepness * steepness * away2
+            })
         })
     }
 
     fn within(&self, p: DVec3, but: u32, radius_m: f64, found: &mut Vec<Neighbour>) {
         let limit = radius_m * radius_m;
-        for row in self.step(p.y - radius_m, 1)..=self.step(p.y + radius_m, 1) {
-            let (first, last) = (self.step(p.x - radius_m, 0), self.step(p.x + radius_m, 0));
-            let run =
-                self.start[row * self.size[0] + first] as usize..self.start[row * self.size[0] + last + 1] as usize;
-            for &i in &self.order[run] {
+        for run in self.around(p, radius_m) {
+            for &i in &self.order[self.start[run.start] as usize..self.start[run.end] as usize] {
                 let d = self.sites[i as usize].at - p;
                 let d2 = d.x * d.x + d.y * d.y + d.z * d.z;
                 if d2 <= limit && i != but {

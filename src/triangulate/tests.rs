@@ -35,7 +35,7 @@ fn draped(points: &[DVec3], settings: &SurfaceSettings, most_points: u64) -> (Ve
     let folder = tempfile::tempdir().unwrap();
     let shelf = Shelf::new(folder.path()).unwrap();
     let found =
-        drape_in_blocks(&cloud(points.to_vec()), &|_| true, settings, (&shelf, 1 << 20, &|_| Ok(())), most_points)
+        drape_in_blocks(&cloud(points.to_vec()), &|_| true, settings, (&shelf, 1 << 26, &|_| Ok(())), most_points)
             .unwrap();
     let (mut file, mut bytes) = (found.triangles, Vec::new());
     file.rewind().unwrap();
@@ -198,7 +198,7 @@ fn points_that_are_not_kept_and_points_that_are_there_twice_do_not_matter() {
     let folder = tempfile::tempdir().unwrap();
     let shelf = Shelf::new(folder.path()).unwrap();
     let found =
-        drape(&cloud(more), &|i| i < 3000, &SurfaceSettings::default(), (&shelf, 1 << 20), &|_| Ok(())).unwrap();
+        drape(&cloud(more), &|i| i < 3000, &SurfaceSettings::default(), (&shelf, 1 << 26), &|_| Ok(())).unwrap();
     let (expected, figures) = draped(&points, &SurfaceSettings::default(), 1 << 17);
     assert_eq!((found.figures.triangles, found.figures.skipped), (expected.len() as u64, 500));
     assert_eq!(found.figures.spacing_m, figures.spacing_m);
@@ -214,7 +214,7 @@ fn a_cloud_without_a_surface_is_refused_by_what_it_lacks() {
     let refusal = |points: Vec<DVec3>| {
         let folder = tempfile::tempdir().unwrap();
         let shelf = Shelf::new(folder.path()).unwrap();
-        drape(&cloud(points), &|_| true, &SurfaceSettings::default(), (&shelf, 1 << 20), &|_| Ok(()))
+        drape(&cloud(points), &|_| true, &SurfaceSettings::default(), (&shelf, 1 << 26), &|_| Ok(()))
             .unwrap_err()
             .to_string()
     };
