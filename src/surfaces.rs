@@ -58,6 +58,9 @@ impl<'a> WholeSurface<'a> {
         };
         let draped = drape(reach, &|point| !reach.is_skipped(point), &settings.surface, (shelf, room), &tell);
         control.check()?;
+        if let Err(DrapeError::NoTriangles { typical_m, .. }) = draped {
+            check_steps(reach, typical_m)?;
+        }
         let draped = draped?;
         reach.release();
         return_free_memory();

@@ -120,3 +120,24 @@ fn a_labelled_cloud_of_a_mesh_and_a_survey_of_both_are_refused_by_name() {
     let refused = run(&both, &Silent, &Control::default()).unwrap_err().to_string();
     assert!(refused.contains("bed.ply is a mesh and") && refused.contains("points.ply a point cloud"), "{refused}");
 }
+
+#[test]
+fn coordinates_that_step_by_as_much_as_points_lie_apart_are_refused_with_the_remedy() {
+    let folder = tempfile::tempdir().unwrap();
+    let cloud = folder.path().join("points.ply");
+    let mut points = gravelometer::open::MemorySurface { triangles: Vec::new(), ..support::bed::bed(4, 60, 60) };
+    // What 32 bits leave of a northing.
+    points.positions.iter_mut().for_each(|p| p.y = f64::from((p.y + 5_250_000.0) as f32));
+    points.positions.iter_mut().for_each(|p| p.x = f64::from((p.x + 500_000.0) as f32));
+    write_float_cloud(&cloud, &points.positions);
+    let refused =
+        run(&job(&cloud, &folder.path().join("out"), Settings::default()), &Silent, &Control::default()).unwrap_err();
+    assert!(refused.to_string().contains("coordinates step by 5.000e-1 m"), "{refused}");
+}
+
+fn write_float_cloud(path: &Path, points: &[gravelometer::geometry::DVec3]) {
+    let mut bytes = format!("ply\nformat binary_little_endian 1.0\nelement vertex {}\n", points.len()).into_bytes();
+    bytes.extend(b"property float x\nproperty float y\nproperty float z\nend_header\n");
+    bytes.extend(points.iter().flat_map(|p| p.as_vec3().to_array()).flat_map(f32::to_le_bytes));
+    std::fs::write(path, bytes).unwrap();
+}
