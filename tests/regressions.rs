@@ -1,6 +1,10 @@
 //! What fuzzing began with and what it found, run once more: see `tools/fuzz`.
 #![allow(missing_docs)]
 
+#[path = "fuzz/checks/las.rs"]
+mod las;
+#[path = "fuzz/checks/offsets.rs"]
+mod offsets;
 #[path = "fuzz/checks/ply.rs"]
 mod ply;
 #[path = "fuzz/checks/settings.rs"]
@@ -25,6 +29,16 @@ fn run_all(target: &str, check: fn(&[u8])) {
 }
 
 #[test]
+fn every_input_kept_for_las_is_read_or_refused_by_name() {
+    run_all("las", las::check);
+}
+
+#[test]
+fn every_input_kept_for_offsets_is_read_or_refused_by_name() {
+    run_all("offsets", offsets::check);
+}
+
+#[test]
 fn every_input_kept_for_ply_is_read_or_refused_by_name() {
     run_all("ply", ply::check);
 }
@@ -40,5 +54,5 @@ fn every_target_is_run_here() {
     let mut names: Vec<_> =
         targets.read_dir().expect("a folder").map(|entry| entry.expect("an entry").file_name()).collect();
     names.sort();
-    assert_eq!(names, ["ply.rs", "settings.rs"], "a target without its test above");
+    assert_eq!(names, ["las.rs", "offsets.rs", "ply.rs", "settings.rs"], "a target without its test above");
 }
