@@ -19,8 +19,9 @@ pub enum WholeSurface<'a> {
     Cloud(DrapedCloud<'a>, DrapeFigures),
 }
 
-/// Coordinates that step by more than this part of the distance between points are no places of points any more.
-const COARSEST_STEP_IN_SPACINGS: f64 = 0.5;
+/// Coordinates that step by more than so many distances between points are no places of points any more. Points on an
+/// exact grid step by one.
+const COARSEST_STEP_IN_SPACINGS: f64 = 2.0;
 
 fn check_steps(reach: &Reach, spacing_m: f64) -> Result<(), OpenError> {
     for file in reach.files() {

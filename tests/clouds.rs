@@ -141,3 +141,18 @@ fn write_float_cloud(path: &Path, points: &[gravelometer::geometry::DVec3]) {
     bytes.extend(points.iter().flat_map(|p| p.as_vec3().to_array()).flat_map(f32::to_le_bytes));
     std::fs::write(path, bytes).unwrap();
 }
+
+#[test]
+fn points_on_an_exact_grid_are_no_destroyed_coordinates() {
+    let folder = tempfile::tempdir().unwrap();
+    let cloud = folder.path().join("grid.ply");
+    let mut text = String::from("ply\nformat ascii 1.0\nelement vertex 2500\n");
+    text += "property float x\nproperty float y\nproperty float z\nend_header\n";
+    for i in 0..2500u32 {
+        let (x, y) = (f64::from(i % 50) / 10.0, f64::from(i / 50) / 10.0);
+        text += &format!("{x:.1} {y:.1} {:.5}\n", 0.2 * (2.0 * x).sin() * (2.0 * y).sin());
+    }
+    std::fs::write(&cloud, text).unwrap();
+    let outcome = run_on(&cloud, &folder.path().join("out"), Settings::default());
+    assert_eq!(outcome.triangles, 2 * 49 * 49);
+}
