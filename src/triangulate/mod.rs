@@ -1,7 +1,7 @@
 //! Triangulating: a point cloud gets a surface.
 //!
-//! Every triangle is a matter of the points around it: which way the surface faces there ([`normals`]), and which points
-//! are neighbours in it ([`umbrella`]). The cloud is worked in blocks, each with all points that can matter to it, and
+//! Every triangle is a matter of the points around it: which way the surface faces there (`normals`), and which points
+//! are neighbours in it (`umbrella`). The cloud is worked in blocks, each with all points that can matter to it, and
 //! every triangle belongs to the block that holds its first corner: the surface is that of the cloud in one piece.
 //!
 //! Walls and overhangs are part of the surface as far as points show them. Where several layers of points lie within a
