@@ -36,7 +36,7 @@ pub fn oddities(catalogue: &Catalogue, scale: &Scale, settings: &Settings) -> Ve
     let at_edges = catalogue.grains.iter().filter(|g| g.grain.touches_edge).count();
     if at_edges as f64 > EDGE_SHARE * catalogue.grains.len() as f64 {
         odd.push(format!(
-            "{at_edges} of {} grains touch an edge of the surface, so their sizes are lower bounds: the surface has many holes",
+            "{at_edges} of {} grains touch an edge of the surface, so their sizes are lower bounds: the surface has many holes\nhelp: of a cloud, a denser one, or a Poisson mesh of it (CloudCompare, MeshLab), has fewer",
             catalogue.grains.len()
         ));
     }
@@ -54,7 +54,7 @@ pub fn oddities_of_cloud(figures: &DrapeFigures) -> Vec<String> {
     }
     if side_unknown > points / 50 {
         odd.push(format!(
-            "of {side_unknown} of {points} points nothing around tells which side of the surface is the outer one (high walls, wide overhangs): grains there may be wrong"
+            "at {side_unknown} of {points} points nothing nearby tells which side of the surface is the outer one (high walls, wide overhangs, the same ground twice): grains there may be wrong"
         ));
     }
     odd

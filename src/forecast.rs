@@ -107,13 +107,18 @@ pub fn index_room(reach: &Reach, room: BuildRoom, welded_bytes: u64) -> Result<B
     Ok(BuildRoom { bytes: room.bytes - welded_bytes, ..room })
 }
 
+/// Bytes that the index takes on disk if it is made in so much memory, and of a cloud its surface.
+pub fn work_disk_bytes(reach: &Reach, room_bytes: u64) -> u64 {
+    let surface = if reach.is_cloud() { reach.vertices() * SURFACE_DISK_BYTES } else { 0 };
+    disk_bytes(reach.vertices(), triangles_to_expect(reach), reach.full_color(), room_bytes) + surface
+}
+
 /// Bytes that the work folder will take.
 ///
 /// # Errors
 /// The disk has less.
 pub fn disk(reach: &Reach, room: BuildRoom, folder: &str, free: Option<u64>) -> Result<u64, ForecastError> {
-    let index = disk_bytes(reach.vertices(), triangles_to_expect(reach), reach.full_color(), room.bytes);
-    let needed = index + if reach.is_cloud() { reach.vertices() * SURFACE_DISK_BYTES } else { 0 };
+    let needed = work_disk_bytes(reach, room.bytes);
     match free {
         Some(free) if free < needed => Err(ForecastError::Disk { folder: folder.to_owned(), needed, free }),
         _ => Ok(needed),

@@ -76,8 +76,8 @@ pub enum Log {
 /// Arguments of `run`.
 #[derive(Debug, Args)]
 pub struct RunArgs {
-    /// Files of one survey: triangle meshes (PLY with faces, binary or text); a folder for all surveys right in it;
-    /// a pattern in quotes, such as "blocks/*.ply"; @LIST for a text file with one path on a line
+    /// Files of one survey: triangle meshes (PLY) or point clouds (LAS, LAZ, COPC, PLY without faces); a folder, for all
+    /// such files right in it; a pattern in quotes, such as "blocks/*.ply"; @LIST for a text file with one path on a line
     #[arg(required = true)]
     pub inputs: Vec<PathBuf>,
     /// Folder for the results; made if missing
@@ -197,8 +197,8 @@ impl SettingArgs {
 /// Arguments of `inspect`.
 #[derive(Debug, Args)]
 pub struct InspectArgs {
-    /// Files of one survey: triangle meshes (PLY with faces, binary or text); a folder for all surveys right in it;
-    /// a pattern in quotes, such as "blocks/*.ply"; @LIST for a text file with one path on a line
+    /// Files of one survey: triangle meshes (PLY) or point clouds (LAS, LAZ, COPC, PLY without faces); a folder, for all
+    /// such files right in it; a pattern in quotes, such as "blocks/*.ply"; @LIST for a text file with one path on a line
     #[arg(required = true)]
     pub inputs: Vec<PathBuf>,
     /// Print JSON

@@ -74,7 +74,7 @@ fn write_survey(f: &mut Formatter<'_>, survey: &SurveyFigures, files: usize) -> 
     let smallest = format!("{} ({})", area(s.smallest_grain_area_m2), length(s.smallest_grain_diameter_m));
     row(f, "smallest grain", format!("{smallest} across: 50 mean triangles"))?;
     let coarse = if s.coarse { " (coarser than 30 mm: boulders only)" } else { "" };
-    row(f, "preset", format!("configs/{}.toml{coarse}", s.preset.name()))?;
+    row(f, "preset", format!("--config {}{coarse}", s.preset.name()))?;
     let limits = format!("--min-grain-area {:e} --max-grain {}", s.min_grain_area_m2, s.max_grain_m);
     row(f, "suggested limits", limits)?;
     let needs = &survey.needs;

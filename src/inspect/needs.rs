@@ -1,9 +1,7 @@
 //! What a run would take, and what is there.
 
-use crate::forecast::{least_bytes, whole_bytes};
-use crate::index::disk_bytes;
+use crate::forecast::{least_bytes, whole_bytes, work_disk_bytes};
 use crate::open::Reach;
-use crate::surfaces::triangles_to_expect;
 use serde::Serialize;
 
 /// Memory and disk of a run.
@@ -15,7 +13,7 @@ pub struct Needs {
     pub whole_memory_bytes: u64,
     /// Memory that is there, bytes, of which a run takes half unless it is told; none where the system does not tell.
     pub memory_there_bytes: Option<u64>,
-    /// Disk that the index takes, bytes; with very little memory about half as much again.
+    /// Disk that the index takes, and of a cloud its surface, bytes; with very little memory about half as much again.
     pub disk_bytes: u64,
 }
 
@@ -26,7 +24,7 @@ impl Needs {
             least_memory_bytes: least_bytes(reach),
             whole_memory_bytes: whole_bytes(reach),
             memory_there_bytes,
-            disk_bytes: disk_bytes(reach.vertices(), triangles_to_expect(reach), reach.full_color(), u64::MAX),
+            disk_bytes: work_disk_bytes(reach, u64::MAX),
         }
     }
 }

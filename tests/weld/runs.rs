@@ -141,11 +141,13 @@ fn six_blocks_of_the_otira_give_the_catalogue_of_the_whole_byte_for_byte() {
     let mut paths = write_all(folder.path(), &grid(&surface, 2, 3, 0.0));
     for (i, preset) in ["rheinwalt2025", "default"].into_iter().enumerate() {
         let mut settings = otira_settings(preset);
-        let wanted = catalogue(vec![path.clone()], out(&format!("whole{i}")), &settings);
+        let whole = out(&format!("whole{i}"));
+        let wanted = catalogue(vec![path.clone()], whole.clone(), &settings);
         settings.work.tile_size_m = [2.5, 0.0][i];
         let blocks = out(&format!("blocks{i}"));
         assert!(catalogue(paths.clone(), blocks.clone(), &settings) == wanted, "{preset}: blocks change grains");
-        assert_eq!(report(&blocks)["facts"]["warnings"].as_array().unwrap().len(), 0);
+        // Nothing is said of borders that is not said of the whole.
+        assert_eq!(report(&blocks)["facts"]["warnings"], report(&whole)["facts"]["warnings"]);
         paths.rotate_left(2);
         paths.swap(1, 4);
     }
