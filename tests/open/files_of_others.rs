@@ -93,7 +93,7 @@ fn the_otira_bed_has_its_figures() {
     assert_eq!(found.survey.suggestion.preset, Preset::LaserScan);
     assert_eq!(found.warnings, Vec::<String>::new());
     let text = found.to_string();
-    assert_contains(&text, &["414183", "PLY binary_little_endian", "configs/laser-scan.toml", "zero-area triangles"]);
+    assert_contains(&text, &["414183", "PLY binary_little_endian", "--config laser-scan", "zero-area triangles"]);
     println!("{text}");
     let json = serde_json::to_value(&found).expect("serializable");
     assert_eq!(json["survey"]["surface"]["zero_area_triangles"], 16);
