@@ -46,6 +46,7 @@ pub mod cli;
 pub mod costs;
 pub mod cuts;
 pub mod demo;
+pub mod divergence;
 pub mod error;
 pub mod facts;
 pub mod forecast;

@@ -55,6 +55,24 @@ pub fn flatter_than(points: &[DVec3], threshold: f64) -> bool {
     hull(points).is_some_and(|exact| sphericity(exact.volume_m3, exact.area_m2) < threshold)
 }
 
+/// How far points lie, in the mean, below the convex hull of others, in the unit of both: below the nearest of the planes
+/// that touch it in [`PAIRS_FOR_DEPTH`] pairs of directions. Of many points every so-many-th is asked.
+pub fn mean_depth(hull_of: &[DVec3], points: &[DVec3]) -> f64 {
+    if hull_of.is_empty() || points.is_empty() {
+        return 0.0;
+    }
+    let (_, planes) = supports(hull_of, PAIRS_FOR_DEPTH);
+    let step = (points.len() / MOST_DEPTHS).max(1);
+    let depth = |p: DVec3| planes.iter().map(|(d, level)| level - d.dot(p - hull_of[0])).fold(f64::INFINITY, f64::min);
+    let asked = points.len().div_ceil(step);
+    points.iter().step_by(step).map(|&p| depth(p)).sum::<f64>() / asked as f64
+}
+
+/// About 0.25 rad apart: of a ball, the planes lie 0.4 % of its radius off.
+const PAIRS_FOR_DEPTH: usize = 100;
+/// Points whose depth is asked; at most twice as many.
+const MOST_DEPTHS: usize = 400;
+
 /// Pairs of opposite directions in which the hull is bounded, at first and where that leaves it open: about 0.6 and
 /// 0.4 rad apart.
 const PAIRS: [usize; 2] = [14, 32];

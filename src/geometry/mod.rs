@@ -9,7 +9,7 @@ mod polytope;
 mod quickhull;
 
 pub use glam::DVec3;
-pub use hull::{Hull, flatter_than, hull, sphericity};
+pub use hull::{Hull, flatter_than, hull, mean_depth, sphericity};
 
 use serde::{Deserialize, Serialize};
 

@@ -30,6 +30,7 @@ pub mod holes;
 pub mod morphology;
 pub mod settle;
 pub mod state;
+pub mod valleys;
 
 pub use settle::{OversizePiece, Segment, Settled};
 
