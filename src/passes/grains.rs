@@ -118,7 +118,8 @@ impl Survey<'_> {
     /// Bytes that the largest tile takes at first.
     pub fn largest_bytes(&self, settings: &Settings) -> u64 {
         let reach_edges = settings.reach_edges();
-        let block = |job| self.grown(self.core(job), self.halo(self.core(job), &settings.segment, (reach_edges, None), 0));
+        let block =
+            |job| self.grown(self.core(job), self.halo(self.core(job), &settings.segment, (reach_edges, None), 0));
         let triangles = |job| self.triangles_in(&block(job));
         TileMesh::footprint_bytes((0..self.plan.tiles.len()).map(triangles).max().unwrap_or(0))
     }
@@ -136,9 +137,7 @@ impl Survey<'_> {
         let core_width = f64::from((core.columns.end - core.columns.start).max(core.rows.end - core.rows.start));
         let widest = if settings.max_grain_m > 0.0 { settings.max_grain_m / cell_m } else { f64::MAX };
         let width = usual_width_m.map_or(UNKNOWN_WIDTH * core_width, |m| m / cell_m).min(widest);
-        let cells = |widths: f64, attempt: i32| {
-            ((reach + widths * width) * FURTHER.powi(attempt.max(0))).ceil() as u32
-        };
+        let cells = |widths: f64, attempt: i32| ((reach + widths * width) * FURTHER.powi(attempt.max(0))).ceil() as u32;
         // What is open after the first attempt mostly went on to the north.
         let (other, north) = (cells(OTHER_WIDTHS, attempt - 1), cells(NORTH_WIDTHS, attempt));
         Halo { south: other, beside: other, north }

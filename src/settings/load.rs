@@ -165,7 +165,12 @@ impl Settings {
     }
 }
 
-pub(super) fn range(key: &'static str, value: impl ToString, ok: bool, rule: &'static str) -> Result<(), SettingsError> {
+pub(super) fn range(
+    key: &'static str,
+    value: impl ToString,
+    ok: bool,
+    rule: &'static str,
+) -> Result<(), SettingsError> {
     if ok { Ok(()) } else { Err(SettingsError::Range { key, value: value.to_string(), rule }) }
 }
 

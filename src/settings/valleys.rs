@@ -26,45 +26,46 @@ pub struct ValleySettings {
     pub growth_edges: f64,
     /// How much further a step in a valley counts than on level ground, per unit of bending, 0 to 100.
     pub valley_cost: f64,
-    /// A core below this mean curvature times the square root of its area looks like sand, -10 to 10.
-    pub sand_roundness: f64,
-    /// A core bent downward by more than this in the mean, in 1 per mean edge length, looks like sand, 0 to 1.
-    pub sand_bend: f64,
-    /// A core whose hull is less spherical than this looks like sand, 0 to 1.
-    pub sand_sphericity: f64,
-    /// A core that lies further below its hull than this, as a share of the square root of its area, looks like sand,
-    /// 0 to 1. What looks like sand in three of four ways is none.
-    pub sand_hollow: f64,
-    /// Cores are joined only if their border is longer than this share of the square root of the smaller one's area,
-    /// 0 to 10; 10 joins none.
-    pub join_border: f64,
-    /// Nor if it is bent downward by more than this in the mean, in 1 per mean edge length, 0 to 10.
-    pub join_depth: f64,
-    /// And only if it lies less than this below the hull of both, mean edge lengths, 0 to 100,
-    pub join_hollow_edges: f64,
-    /// or less than this share of the square root of the smaller one's area, 0 to 10.
+    /// How much further a step counts where the surface faces straight down, as membranes do that a reconstruction spans
+    /// over what no camera saw, 0 to 100; in proportion where it faces less down.
+    pub overhang_cost: f64,
+    /// How late sand starts to grow against stones, mean edge lengths, 0 to 50.
+    pub sand_delay_edges: f64,
+    /// A core that scores less is no stone, -10 to 10: sphericity of its hull (1 for a ball) plus half of its mean curvature
+    /// times the square root of its area (2.5 for half a ball, 0 for a plane), less
+    /// for a core that lies level and hollow.
+    pub stone_score: f64,
+    /// Cores are joined over gaps up to this share of the square root of the smaller one's area, 0 to 10; 0 joins none,
+    pub join_reach: f64,
+    /// and up to so many mean edge lengths, 0 to 50,
+    pub join_reach_edges: f64,
+    /// if the points of each rise over the tangent planes of the other by less than this, mean sine, 0 to 1,
+    pub join_rise: f64,
+    /// lie less than this below the hull of both, as a share of the square root of their area, 0 to 1,
     pub join_hollow: f64,
+    /// and if other cores reach into that hull with less than this share of the smaller one's area, 0 to 10.
+    pub join_swallowed: f64,
 }
 
 impl Default for ValleySettings {
     fn default() -> Self {
         ValleySettings {
             normal_passes: 6,
-            crease: 0.3,
-            valley_depth: 0.07,
-            bridge_edges: 1.5,
-            seed_share: 0.5,
+            crease: 0.2,
+            valley_depth: 0.06,
+            bridge_edges: 1.25,
+            seed_share: 0.4,
             refill_edges: 4.0,
-            growth_edges: 6.0,
+            growth_edges: 10.0,
             valley_cost: 4.0,
-            sand_roundness: 0.5,
-            sand_bend: 0.01,
-            sand_sphericity: 0.45,
-            sand_hollow: 0.012,
-            join_border: 0.3,
-            join_depth: 0.2,
-            join_hollow_edges: 1.5,
-            join_hollow: 0.08,
+            overhang_cost: 8.0,
+            sand_delay_edges: 4.0,
+            stone_score: 0.6,
+            join_reach: 1.5,
+            join_reach_edges: 30.0,
+            join_rise: 0.02,
+            join_hollow: 0.02,
+            join_swallowed: 0.1,
         }
     }
 }
@@ -73,7 +74,11 @@ impl ValleySettings {
     /// How far the steps look beyond a body, mean edge lengths: the sum of their reaches. A ring of vertices is about
     /// one edge wide.
     pub fn reach_edges(&self) -> f64 {
-        f64::from(self.normal_passes + 2) + self.bridge_edges + self.refill_edges + self.growth_edges
+        f64::from(self.normal_passes + 2)
+            + self.bridge_edges
+            + self.refill_edges
+            + self.growth_edges
+            + self.join_reach_edges
     }
 
     /// Checks every value against its range.
@@ -97,14 +102,14 @@ impl ValleySettings {
             refill_edges 0.0 50.0;
             growth_edges 0.0 50.0;
             valley_cost 0.0 100.0;
-            sand_roundness -10.0 10.0;
-            sand_bend 0.0 1.0;
-            sand_sphericity 0.0 1.0;
-            sand_hollow 0.0 1.0;
-            join_border 0.0 10.0;
-            join_depth 0.0 10.0;
-            join_hollow_edges 0.0 100.0;
-            join_hollow 0.0 10.0;
+            overhang_cost 0.0 100.0;
+            sand_delay_edges 0.0 50.0;
+            stone_score -10.0 10.0;
+            join_reach 0.0 10.0;
+            join_reach_edges 0.0 50.0;
+            join_rise 0.0 1.0;
+            join_hollow 0.0 1.0;
+            join_swallowed 0.0 10.0;
         }
         Ok(())
     }

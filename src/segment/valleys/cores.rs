@@ -4,9 +4,10 @@ use super::bend::Bend;
 use super::flood::{FAR, Flood, parts};
 use super::neighbours::Neighbours;
 use super::{NONE, UNKNOWN};
-use crate::geometry::{DVec3, PlanBox};
+use crate::geometry::DVec3;
 use crate::segment::components::Forest;
 use crate::settings::ValleySettings;
+use glam::Vec3;
 use rayon::prelude::*;
 
 /// Vertices that one thread joins at a time.
@@ -18,8 +19,10 @@ pub struct Ground<'g> {
     pub positions: &'g [DVec3],
     /// Who lies beside whom.
     pub neighbours: &'g Neighbours,
-    /// Bending of each vertex; of no meaning where it is unknown.
+    /// Bending of each vertex; of no meaning where it is unknown, as the normals.
     pub bends: &'g [Bend],
+    /// Smoothed normals.
+    pub normals: &'g [Vec3],
     /// Vertices whose bending hangs on what is not loaded; none where everything is.
     pub unknown: Option<&'g [bool]>,
     /// A third of the triangles around each vertex, m².
@@ -29,6 +32,12 @@ pub struct Ground<'g> {
 }
 
 impl Ground<'_> {
+    /// Whether a vertex lies in a valley, or at an edge that spans a gap.
+    fn divides(&self, v: usize, settings: &ValleySettings) -> bool {
+        f64::from(self.bends[v].least) < -settings.valley_depth
+            || self.neighbours.around(v).iter().any(|&u| self.edges(v, u as usize) > GAP_EDGES)
+    }
+
     fn is_unknown(&self, v: usize) -> bool {
         self.unknown.is_some_and(|unknown| unknown[v])
     }
@@ -40,6 +49,9 @@ impl Ground<'_> {
     }
 }
 
+/// Edges longer than this span a gap. So a vertex of a core has all its triangles near by, and one that is not loaded
+/// lies this near the cut at most.
+pub const GAP_EDGES: f64 = 10.0;
 /// The cores of a tile.
 pub struct Cores {
     /// Core of each vertex; [`NONE`], or [`UNKNOWN`].
@@ -57,16 +69,17 @@ impl Cores {
     pub fn of(ground: &Ground, settings: &ValleySettings, seed_area_m2: f64) -> Cores {
         let neighbours = ground.neighbours;
         let vertices = neighbours.len();
-        let valley = |v: usize| f64::from(ground.bends[v].least) < -settings.valley_depth;
+        let divides: Vec<bool> =
+            (0..vertices).into_par_iter().with_min_len(1 << 12).map(|v| ground.divides(v, settings)).collect();
         let length = |a: usize, b: usize| Some(parts(ground.edges(a, b)));
         let bridge = parts(settings.bridge_edges) as u16;
         let shore = Flood::from(
             neighbours,
-            |v| !ground.is_unknown(v) && (valley(v) || neighbours.at_mesh_edge(v)),
+            |v| (!ground.is_unknown(v) && (divides[v] || neighbours.at_mesh_edge(v))).then_some(0),
             bridge,
             length,
         );
-        let doubt = ground.unknown.map(|unknown| Flood::from(neighbours, |v| unknown[v], bridge, length));
+        let doubt = ground.unknown.map(|unknown| Flood::from(neighbours, |v| unknown[v].then_some(0), bridge, length));
         let doubtful = |v: usize| !shore.reached(v) && doubt.as_ref().is_some_and(|doubt| doubt.reached(v));
         let mut of = seeds(neighbours, |v| !shore.reached(v) && !doubtful(v));
         let count = number(&mut of);
@@ -92,7 +105,9 @@ impl Cores {
         of.par_iter_mut().filter(|seed| **seed < UNKNOWN).for_each(|seed| *seed = fate[*seed as usize]);
         drop((shore, doubt));
         let reach = parts(settings.refill_edges) as u16;
-        let of = spread(ground, &of, reach, |a, b| (ground.is_unknown(b) || !valley(b)).then(|| parts(ground.edges(a, b))));
+        let start = |v: usize| (of[v] < UNKNOWN).then_some(0);
+        let passable = |a: usize, b: usize| (!divides[b] || ground.is_unknown(b)).then(|| parts(ground.edges(a, b)));
+        let of = spread(ground, (&start, &|v| of[v] == UNKNOWN, &|v| of[v]), reach, passable);
         let open = beside_unknown(neighbours, &of, kept as usize);
         Cores { of, open }
     }
@@ -114,26 +129,29 @@ impl Cores {
     }
 }
 
-/// Labels grow from the vertices that have one as far as `reach`, and meet halfway. What could be reached from an
-/// unknown vertex as soon as from a known one is unknown.
+/// Where each vertex begins, which are in doubt, and the labels of those that begin.
+pub type Sources<'s> =
+    (&'s (dyn Fn(usize) -> Option<u16> + Sync), &'s (dyn Fn(usize) -> bool + Sync), &'s (dyn Fn(usize) -> u32 + Sync));
+
+/// Labels spread from the sources as far as `reach`, and meet where they are equally far. What could be reached from a
+/// vertex in doubt as soon as from a source is [`UNKNOWN`].
 pub fn spread(
     ground: &Ground,
-    labels: &[u32],
+    (start, in_doubt, label): Sources,
     reach: u16,
     cost: impl Fn(usize, usize) -> Option<u32> + Sync,
 ) -> Vec<u32> {
     let neighbours = ground.neighbours;
-    let known = Flood::from(neighbours, |v| labels[v] < UNKNOWN, reach, &cost);
-    let doubt =
-        ground.unknown.map(|_| Flood::from(neighbours, |v| labels[v] == UNKNOWN, reach, &cost));
-    let label = |v: usize| {
+    let known = Flood::from(neighbours, start, reach, &cost);
+    let doubt = ground.unknown.map(|_| Flood::from(neighbours, |v| in_doubt(v).then_some(0), reach, &cost));
+    let spread = |v: usize| {
         let doubt = doubt.as_ref().map_or(FAR, |doubt| doubt.distance[v]);
         match known.distance[v] {
             distance if doubt <= distance && doubt != FAR => UNKNOWN,
-            _ => known.source(v).map_or(NONE, |source| labels[source]),
+            _ => known.source(v).map_or(NONE, label),
         }
     };
-    (0..neighbours.len()).into_par_iter().with_min_len(1 << 12).map(label).collect()
+    (0..neighbours.len()).into_par_iter().with_min_len(1 << 12).map(spread).collect()
 }
 
 /// Which of so many labels lie beside an unknown vertex.
@@ -190,13 +208,4 @@ fn number(of: &mut [u32]) -> usize {
         };
     }
     count as usize
-}
-
-/// Boxes in plan of so many labels.
-pub fn boxes(positions: &[DVec3], labels: &[u32], count: usize) -> Vec<PlanBox> {
-    let mut boxes = vec![PlanBox::EMPTY; count];
-    for (v, &label) in labels.iter().enumerate().filter(|(_, label)| **label < UNKNOWN) {
-        boxes[label as usize].include(positions[v]);
-    }
-    boxes
 }

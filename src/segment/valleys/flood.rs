@@ -32,11 +32,12 @@ pub struct Flood {
 }
 
 impl Flood {
-    /// Floods from all sources as far as `reach` parts. `cost` gives the length of the step from a vertex to its
+    /// Floods as far as `reach` parts. `start` gives the distance with which a source begins; none for other vertices.
+    /// `cost` gives the length of the step from a vertex to its
     /// neighbour; none where there is no way.
     pub fn from(
         neighbours: &Neighbours,
-        source: impl Fn(usize) -> bool + Sync,
+        start: impl Fn(usize) -> Option<u16> + Sync,
         reach: u16,
         cost: impl Fn(usize, usize) -> Option<u32> + Sync,
     ) -> Flood {
@@ -55,7 +56,7 @@ impl Flood {
                 .map(|(band, ((distance, by), steps))| {
                     let mut front = Front { first: BAND * band, distance, by, reach, levels: Vec::new() };
                     match first {
-                        true => front.begin(&source),
+                        true => front.begin(&start),
                         false => steps.iter().for_each(|step| front.reach(*step)),
                     }
                     if front.levels.is_empty() { Vec::new() } else { front.spread(neighbours, &cost) }
@@ -105,17 +106,11 @@ struct Front<'f> {
 }
 
 impl Front<'_> {
-    fn begin(&mut self, source: &impl Fn(usize) -> bool) {
-        let first = self.first;
-        let sources: Vec<u32> =
-            (first..first + self.distance.len()).filter(|&v| source(v)).map(|v| v as u32).collect();
-        for &v in &sources {
-            self.distance[v as usize - first] = 0;
-            self.by[v as usize - first] = v;
-        }
-        if !sources.is_empty() {
-            self.levels.resize(1 + usize::from(self.reach), Vec::new());
-            self.levels[0] = sources;
+    fn begin(&mut self, start: &impl Fn(usize) -> Option<u16>) {
+        for to in self.first..self.first + self.distance.len() {
+            if let Some(distance) = start(to).filter(|&distance| distance <= self.reach) {
+                self.reach(Step { to: to as u32, by: to as u32, distance });
+            }
         }
     }
 
@@ -131,17 +126,13 @@ impl Front<'_> {
                 self.levels.resize(1 + usize::from(self.reach), Vec::new());
             }
             self.levels[usize::from(distance)].push(to);
-        } else if distance == known && distance > 0 && by < self.by[place] {
+        } else if distance == known && by < self.by[place] && self.by[place] != to {
             self.by[place] = by;
         }
     }
 
     /// Spreads within the band, nearest vertices first, and gives the steps that lead out of it.
-    fn spread(
-        &mut self,
-        neighbours: &Neighbours,
-        cost: &impl Fn(usize, usize) -> Option<u32>,
-    ) -> Vec<Step> {
+    fn spread(&mut self, neighbours: &Neighbours, cost: &impl Fn(usize, usize) -> Option<u32>) -> Vec<Step> {
         let mut crossing = Vec::new();
         for level in 0..self.levels.len() {
             for v in std::mem::take(&mut self.levels[level]) {
@@ -194,11 +185,12 @@ mod tests {
             };
             let neighbours = Neighbours::of(&Bands::of(&mesh));
             let (first, closed, reach) = (below(5), below(7), 1 + below(20) as u16);
-            let source = |v: usize| v as u64 % 9 == first;
+            let start = |v: usize| (v as u64 % 9 == first).then_some((v % 4) as u16);
             let cost = |a: usize, b: usize| (b as u64 % 7 != closed).then_some(1 + ((a + b) % 3) as u32);
-            let flood = Flood::from(&neighbours, source, reach, cost);
+            let flood = Flood::from(&neighbours, start, reach, cost);
             let n = vertices as usize;
-            let mut distance: Vec<u32> = (0..n).map(|v| if source(v) { 0 } else { u32::MAX }).collect();
+            let mut distance: Vec<u32> =
+                (0..n).map(|v| start(v).filter(|&d| d <= reach).map_or(u32::MAX, u32::from)).collect();
             loop {
                 let before = distance.clone();
                 for v in (0..n).filter(|&v| before[v] != u32::MAX) {
@@ -220,7 +212,8 @@ mod tests {
                     continue;
                 }
                 assert_eq!(u32::from(flood.distance[v]), distance[v]);
-                if distance[v] == 0 {
+                // A source keeps to itself what others reach no sooner.
+                if start(v).is_some_and(|start| u32::from(start) == distance[v]) {
                     assert_eq!(flood.source(v), Some(v));
                     continue;
                 }

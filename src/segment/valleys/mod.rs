@@ -5,22 +5,26 @@
 //! | normals, smoothed along the surface but not across creases | [`normals`] | `normal_passes` + 1 rings of vertices |
 //! | least curvature: where it is low, across a crease, is a valley | [`bend`] | one more ring |
 //! | seeds: what is further than `bridge_edges` from all valleys | [`cores`] | `bridge_edges`, and a seed |
-//! | cores: seeds given back what lies around them on their side of the valleys | [`cores`] | `refill_edges` |
-//! | growth up to the valley line, which is far where it is deep | [`cores`] | `growth_edges` |
-//! | cores of one stone joined, sheets of sand and membranes dropped | [`judge`] | a core, and those beside it |
+//! | cores: seeds take back what lies around them on their side of the valleys | [`cores`] | `refill_edges` |
+//! | what a core is: stone, sand, or a sheet | [`judge`] | a core |
+//! | growth up to the valley line, which is far where it is deep | [`growth`] | `growth_edges` |
+//! | cores of one stone joined, also across a gap | [`joins`] | `join_reach_edges`, and two cores |
 //! | grains: triangles by the majority of their vertices | [`settle`] | a grain |
 //!
 //! Lengths are in mean edge lengths of the survey (`_edges`), so that one default serves meshes of 0.1 mm and of 5 mm.
 //!
 //! **Certainty.** Vertices whose bending hangs on triangles beyond the halo are unknown, and what could be reached from
-//! an unknown vertex as soon as from a known one is unknown as well. A core is whole if nothing unknown lies beside it,
-//! and a grain is settled if all its cores are whole, nothing unknown lies beside what grew from them, and each
-//! neighbour that might be joined to them is whole too. Then it is exactly the grain of the untiled run.
+//! an unknown vertex as soon as from a known one is unknown as well. A core is whole if nothing unknown lies beside it.
+//! A grain is settled if all its cores are whole, nothing unknown lies beside what grew from them, and nothing unknown, nor
+//! a core that is not whole, lies where something could be joined to them. Then it is exactly the grain of the untiled run.
 
 pub mod bend;
-pub mod borders;
 pub mod cores;
+pub mod evidence;
+pub mod fates;
 pub mod flood;
+pub mod growth;
+pub mod joins;
 pub mod judge;
 pub mod neighbours;
 pub mod normals;
@@ -29,12 +33,17 @@ pub mod settle;
 use super::bands::Bands;
 use super::settle::Settled;
 use super::{Sizes, smallest_grain_area_m2};
+use crate::geometry::PlanBox;
 use crate::index::Scale;
 use crate::settings::{SegmentSettings, ValleySettings};
 use crate::tile::TileMesh;
-use bend::bends;
-use cores::{Cores, Ground, spread};
-use flood::parts;
+use bend::{Bend, bends};
+use cores::{Cores, Ground, beside_unknown};
+use evidence::evidence;
+use fates::Fates;
+use growth::grow;
+use joins::join;
+use judge::{Kind, judge};
 use neighbours::Neighbours;
 use normals::Normals;
 
@@ -51,28 +60,48 @@ pub fn segment_along_valleys(
     settings: &ValleySettings,
 ) -> Settled {
     let bands = Bands::of(mesh);
-    let neighbours = Neighbours::of(&bands);
-    let mut normals = Normals::of(&bands);
-    normals.smooth(&neighbours, settings.normal_passes, settings.crease as f32);
-    let bends = bends(&mesh.positions, &neighbours, &normals, scale.mean_edge_m);
-    let Normals { area_m2, unit } = normals;
-    drop(unit);
-    let unknown = within_rings_of_the_cut(mesh, &neighbours, settings.normal_passes + 1);
-    let ground = Ground {
-        positions: &mesh.positions,
-        neighbours: &neighbours,
-        bends: &bends,
-        unknown: unknown.as_deref(),
-        area_m2: &area_m2,
-        mean_edge_m: scale.mean_edge_m,
-    };
-    let sizes = Sizes::new(scale, segment);
+    let surface = Surface::of(mesh, &bands, scale, settings);
+    let ground = surface.ground(mesh, scale);
     let cores = Cores::of(&ground, settings, settings.seed_share * smallest_grain_area_m2(scale, segment));
-    let steepness = |v: usize| 1.0 + settings.valley_cost * f64::from(-bends[v].least).max(0.0);
-    let uphill = |a: usize, b: usize| Some(parts(ground.edges(a, b) * 0.5 * (steepness(a) + steepness(b))));
-    let grown = spread(&ground, &cores.of, parts(settings.growth_edges) as u16, uphill);
-    let fates = judge::judge(&ground, &cores, &grown, (segment, settings));
-    settle::settle(mesh, &neighbours, &grown, &fates, &sizes)
+    let judged = judge(&ground, &cores, (segment, settings));
+    let kinds: Vec<Kind> = judged.iter().map(|core| core.kind).collect();
+    let grown = grow(&ground, &cores.of, &kinds, settings);
+    let joined = join(&ground, &cores.of, &judged, mesh.seen.as_ref().unwrap_or(&PlanBox::EVERYWHERE), settings);
+    let whole = beside_unknown(&surface.neighbours, &grown, judged.len()).into_iter().map(|open| !open).collect();
+    let fates = Fates::of(&judged, &joined, whole, segment.max_grain_m);
+    let evidence = evidence(&ground, &grown, &judged, &fates);
+    settle::settle(mesh, &surface.neighbours, &grown, (&fates, &evidence), &Sizes::new(scale, segment))
+}
+
+/// What the surface is like at every vertex.
+struct Surface {
+    neighbours: Neighbours,
+    normals: Normals,
+    bends: Vec<Bend>,
+    unknown: Option<Vec<bool>>,
+}
+
+impl Surface {
+    fn of(mesh: &TileMesh, bands: &Bands, scale: &Scale, settings: &ValleySettings) -> Surface {
+        let neighbours = Neighbours::of(bands);
+        let mut normals = Normals::of(bands);
+        normals.smooth(&neighbours, settings.normal_passes, settings.crease as f32);
+        let bends = bends(&mesh.positions, &neighbours, &normals, scale.mean_edge_m);
+        let unknown = within_rings_of_the_cut(mesh, &neighbours, settings.normal_passes + 1);
+        Surface { neighbours, normals, bends, unknown }
+    }
+
+    fn ground<'g>(&'g self, mesh: &'g TileMesh, scale: &Scale) -> Ground<'g> {
+        Ground {
+            positions: &mesh.positions,
+            neighbours: &self.neighbours,
+            bends: &self.bends,
+            normals: &self.normals.unit,
+            unknown: self.unknown.as_deref(),
+            area_m2: &self.normals.area_m2,
+            mean_edge_m: scale.mean_edge_m,
+        }
+    }
 }
 
 /// Vertices within so many rings of one that is not complete; none where all are.

@@ -1,22 +1,32 @@
 //! Settling: triangles go to grains by the majority of their vertices, and what is certain may be published.
 
-use super::judge::Fates;
+use super::fates::Fates;
 use super::neighbours::Neighbours;
 use super::{NONE, UNKNOWN};
 use crate::segment::Sizes;
-use crate::segment::settle::{Segment, Settled};
+use crate::segment::settle::{Evidence, Segment, Settled};
 use crate::tile::TileMesh;
 use rayon::prelude::*;
 
 /// Gives every triangle to the grain that two of its vertices belong to, drops grains below the smallest, and sorts out
 /// what the core may publish: see [`Settled`], whose rule of the lowest triangle holds here as well.
-pub fn settle(mesh: &TileMesh, neighbours: &Neighbours, grown: &[u32], fates: &Fates, sizes: &Sizes) -> Settled {
+pub fn settle(
+    mesh: &TileMesh,
+    neighbours: &Neighbours,
+    grown: &[u32],
+    (fates, evidence): (&Fates, &[Evidence]),
+    sizes: &Sizes,
+) -> Settled {
     let of_vertex = |v: u32| match grown[v as usize] {
         label if label >= UNKNOWN => label,
         label => fates.group[label as usize],
     };
-    let grain: Vec<u32> =
-        mesh.triangles.par_iter().with_min_len(1 << 12).map(|corners| majority(corners.map(of_vertex), fates)).collect();
+    let grain: Vec<u32> = mesh
+        .triangles
+        .par_iter()
+        .with_min_len(1 << 12)
+        .map(|corners| majority(corners.map(of_vertex), fates))
+        .collect();
     let groups = fates.group.len();
     let (mut lowest, mut count, mut size) = (vec![NONE; groups], vec![0usize; groups], vec![0u64; groups]);
     for (t, &group) in (0u32..).zip(&grain).filter(|(_, group)| **group < UNKNOWN) {
@@ -31,7 +41,11 @@ pub fn settle(mesh: &TileMesh, neighbours: &Neighbours, grown: &[u32], fates: &F
     let mut segments: Vec<Option<Segment>> = (0..groups)
         .map(|group| {
             let publish = fates.known[group] && owned(group) && size[group] >= sizes.smallest;
-            publish.then(|| Segment { triangles: Vec::with_capacity(count[group]), at_mesh_edge: false })
+            publish.then(|| Segment {
+                triangles: Vec::with_capacity(count[group]),
+                at_mesh_edge: false,
+                evidence: Some(evidence[group]),
+            })
         })
         .collect();
     let mut unsettled = Vec::new();
@@ -53,7 +67,13 @@ pub fn settle(mesh: &TileMesh, neighbours: &Neighbours, grown: &[u32], fates: &F
 
 /// What at least two of three vertices say; [`NONE`] where no two agree, and [`UNKNOWN`] where two might.
 fn majority([a, b, c]: [u32; 3], fates: &Fates) -> u32 {
-    let agreed = if a == b || a == c { a } else if b == c { b } else { NONE };
+    let agreed = if a == b || a == c {
+        a
+    } else if b == c {
+        b
+    } else {
+        NONE
+    };
     let open = |label: &u32| *label < UNKNOWN && !fates.known[*label as usize];
     match agreed {
         NONE if a == b || a == c || b == c => NONE,
