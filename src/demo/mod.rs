@@ -15,7 +15,6 @@
 mod bed;
 mod color;
 mod finish;
-mod picture;
 mod placement;
 mod ply;
 mod random;
@@ -29,9 +28,10 @@ mod stone;
 mod surface;
 mod voxels;
 
-pub use picture::{Picture, PictureError, top_view, write_png};
+pub use crate::picture::{Picture, PictureError, top_view, write_png};
+pub use crate::validate::Detection;
 pub use ply::{write_ply, write_truth_csv};
 pub use scene::{Scene, Stone, make_scene};
-pub use score::{Detection, MIN_GRAIN_AREA_M2, Score, VISIBLE_AREA_FACTOR, score};
+pub use score::{MIN_GRAIN_AREA_M2, Score, VISIBLE_AREA_FACTOR, score};
 pub use settings::{SAND, SceneSettings};
 pub use show::{DemoError, Demonstration, Shown, demonstrate};
