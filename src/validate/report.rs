@@ -62,7 +62,7 @@ pub struct Report {
     /// How far the confidence of the run's table can be trusted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reliability: Option<Reliability>,
-    /// What the true labels themselves get, but for single stones: the best that can be.
+    /// What the true labels themselves get, without the list of stones: the best that can be.
     pub perfect_labels: Score,
 }
 
@@ -123,7 +123,7 @@ fn report(what: &Validation, label_file: &Path, truth: &Truth, scored: &Scored, 
         ellipsoid: table.and_then(|table| table.ellipsoid(truth, scored)),
         fit: table.and_then(|table| table.fit(truth, scored)),
         reliability: table.and_then(|table| table.reliability(scored)),
-        perfect_labels: Score { reference_pebbles: None, matched: Vec::new(), ..perfect },
+        perfect_labels: Score { matched: Vec::new(), ..perfect },
     }
 }
 

@@ -150,12 +150,10 @@ fn read_ids(
             None => Ok(ids),
         }
     };
+    let best = if rule == TruthRule::Best { Some(read(TRUE_BEST)?) } else { None };
     let strict = if has_strict || rule == TruthRule::Strict { Some(read(TRUE_STRICT)?) } else { None };
     let unseen = strict.iter().flatten().map(|&id| id == UNSEEN).collect();
-    let ids = match (rule, strict) {
-        (TruthRule::Strict, Some(strict)) => strict,
-        _ => read(TRUE_BEST)?,
-    };
+    let ids = best.or(strict).unwrap_or_default();
     // Below the number of rows of a table, which fits.
     Ok((ids.into_iter().map(|id| id.max(-1) as i32).collect(), unseen))
 }
