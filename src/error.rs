@@ -50,7 +50,7 @@ pub enum Error {
     Demo(#[from] DemoError),
     /// The run cannot be held against known stones.
     #[error(transparent)]
-    Validate(#[from] ValidateError),
+    Validate(Box<ValidateError>),
     /// Somebody pressed Ctrl-C.
     #[error(transparent)]
     Interrupted(#[from] Interrupted),
@@ -110,6 +110,12 @@ pub enum ExitCode {
     DoneWithLosses = 3,
     /// Ctrl-C or a termination signal.
     Interrupted = 130,
+}
+
+impl From<ValidateError> for Error {
+    fn from(error: ValidateError) -> Error {
+        Error::Validate(Box::new(error))
+    }
 }
 
 impl<E: Into<Error>> From<Stopped<E>> for Error {

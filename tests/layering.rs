@@ -24,10 +24,8 @@ const MACHINERY: [&str; 3] = ["pipeline", "progress", "store"];
 /// Stages that touch the disk through `store`.
 const KEEPS: [&str; 4] = ["triangulate", "index", "tile", "write"];
 /// What stands beside the river and must not know how grains are found and measured, with all that it may use.
-const BESIDE: [(&str, &[&str]); 2] = [
-    ("picture", &["geometry"]),
-    ("validate", &["geometry", "settings", "open", "statistics", "store", "picture"]),
-];
+const BESIDE: [(&str, &[&str]); 2] =
+    [("picture", &["geometry"]), ("validate", &["geometry", "settings", "open", "statistics", "store", "picture"])];
 const MOST_LINES: usize = 400;
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {

@@ -113,7 +113,7 @@ fn read_ply(path: &Path, scene: &Reach) -> Result<Vec<i64>, ValidateError> {
     let reach = open_metres(path)?;
     let [file] = reach.files() else { return Err(no_labels(path)) };
     let property = |name: &&str| file.vertex_properties().iter().find(|p| p.name == **name);
-    let vertex_label = LABEL_NAMES.iter().find_map(|name| property(&name));
+    let vertex_label = LABEL_NAMES.iter().find_map(property);
     let face_label = file.face_label();
     if face_label.is_none() && vertex_label.is_none() {
         return Err(no_labels(path));

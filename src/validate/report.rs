@@ -2,6 +2,7 @@
 
 use super::error::ValidateError;
 use super::grain_table::{GrainTable, Reliability, SizedBy, grain_table_file};
+use super::judgement::Mostly;
 use super::labels::{Labels, label_file, read_labels};
 use super::map::draw;
 use super::score::{Score, Scored, score};
@@ -53,6 +54,8 @@ pub struct Report {
     /// The score of the labels.
     #[serde(flatten)]
     pub score: Score,
+    /// Which stones and grains went wrong.
+    pub astray: Astray,
     /// Sizes by the least-squares ellipsoid of the run's table.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ellipsoid: Option<SizedBy>,
@@ -64,6 +67,36 @@ pub struct Report {
     pub reliability: Option<Reliability>,
     /// What the true labels themselves get, without the list of stones: the best that can be.
     pub perfect_labels: Score,
+}
+
+/// Stones and grains that went wrong by majority: to look at one by one.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Astray {
+    /// Stones in another stone's grain, rows of `truth.csv` from 0.
+    pub merged_stones: Vec<usize>,
+    /// Other stones that were missed, the same.
+    pub overlooked_stones: Vec<usize>,
+    /// Ids of further grains on stones that were found.
+    pub further_grains: Vec<i64>,
+    /// Ids of grains that are mostly sand.
+    pub sand_grains: Vec<i64>,
+}
+
+impl Astray {
+    fn of(scored: &Scored) -> Astray {
+        let judgement = &scored.judgement;
+        let ids = |is_wanted: &dyn Fn(usize, Mostly) -> bool| {
+            let grains = judgement.mostly.iter().enumerate().filter(|&(grain, &kind)| is_wanted(grain, kind));
+            grains.map(|(grain, _)| scored.overlaps.grain_ids[grain]).collect()
+        };
+        let is_match = |grain: usize, stone: usize| judgement.matches.get(&stone) == Some(&grain);
+        Astray {
+            merged_stones: judgement.merged.clone(),
+            overlooked_stones: judgement.overlooked.clone(),
+            further_grains: ids(&|grain, kind| matches!(kind, Mostly::Stone(stone) if !is_match(grain, stone))),
+            sand_grains: ids(&|_, kind| kind == Mostly::Sand),
+        }
+    }
 }
 
 /// What came of a validation. `Display` of the report gives tables.
@@ -120,6 +153,7 @@ fn report(what: &Validation, label_file: &Path, truth: &Truth, scored: &Scored, 
         visible_area_m2: what.visible_area_m2,
         min_area_m2: what.min_area_m2,
         score: scored.score.clone(),
+        astray: Astray::of(scored),
         ellipsoid: table.and_then(|table| table.ellipsoid(truth, scored)),
         fit: table.and_then(|table| table.fit(truth, scored)),
         reliability: table.and_then(|table| table.reliability(scored)),

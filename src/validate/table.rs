@@ -11,11 +11,11 @@ impl Display for Report {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let (score, perfect) = (&self.score, &self.perfect_labels);
         let rule = match self.truth {
-            TruthRule::Best => "all that lies nearest to them",
-            TruthRule::Strict => "what lies right on them",
+            TruthRule::Best => "all that lies nearest to it",
+            TruthRule::Strict => "only what lies right on it",
         };
         writeln!(f, "{} against {}", self.labels, self.scene)?;
-        writeln!(f, "{} visible stones ({rule}), {} grains\n", score.visible, score.segments)?;
+        writeln!(f, "{} stones count, {} grains; a stone is {rule}\n", score.visible, score.segments)?;
         writeln!(
             f,
             "{:<26}{:>6}{:>7}{:>7}{:>11}{:>8}{:>7}{:>7}",
@@ -88,8 +88,8 @@ fn write_errors(f: &mut Formatter<'_>, score: &Score) -> fmt::Result {
 }
 
 fn write_axes(f: &mut Formatter<'_>, report: &Report, boxes: &AxisErrors) -> fmt::Result {
-    writeln!(f, "\n{:<26}{:>24}{:>24}{:>24}", "axes, errors in percent", "A", "B", "C")?;
-    writeln!(f, "{:<26}{}", "", format!("{:>9}{:>8}{:>7}", "mean |e|", "median", "bias").repeat(3))?;
+    writeln!(f, "\n{:<26}{:^26}{:^26}{:^26}", "axes, errors in percent", "A", "B", "C")?;
+    writeln!(f, "{:<26}{}", "", format!("{:>10}{:>8}{:>8}", "mean |e|", "median", "bias").repeat(3))?;
     write_axis_errors(f, "bounding box (PCA)", boxes)?;
     let by_run = [("ellipsoid of the run", &report.ellipsoid), ("fit of the run", &report.fit)];
     for (name, sized) in by_run {
@@ -106,9 +106,20 @@ fn write_axes(f: &mut Formatter<'_>, report: &Report, boxes: &AxisErrors) -> fmt
 fn write_axis_errors(f: &mut Formatter<'_>, name: &str, axes: &AxisErrors) -> fmt::Result {
     write!(f, "{name:<26}")?;
     for axis in axes.to_array() {
-        write!(f, "{:>9.1}{:>8.1}{:>+7.1}", axis.mean_abs_percent, axis.median_abs_percent, axis.bias_percent)?;
+        let [mean, median] = [axis.mean_abs_percent, axis.median_abs_percent].map(|e| percent(e, false));
+        write!(f, "{mean:>10}{median:>8}{:>8}", percent(axis.bias_percent, true))?;
     }
     writeln!(f)
+}
+
+/// Percent with one decimal; what is beyond all sense, such as an ellipsoid that fits nearly a plane, stays short.
+fn percent(value: f64, has_sign: bool) -> String {
+    match (value.abs() < 1e4 || value.is_nan(), has_sign) {
+        (true, false) => format!("{value:.1}"),
+        (true, true) => format!("{value:+.1}"),
+        (false, false) => format!("{value:.0e}"),
+        (false, true) => format!("{value:+.0e}"),
+    }
 }
 
 fn write_degrees(f: &mut Formatter<'_>, name: &str, [a, b, c, all]: [f64; 4]) -> fmt::Result {
@@ -116,7 +127,7 @@ fn write_degrees(f: &mut Formatter<'_>, name: &str, [a, b, c, all]: [f64; 4]) ->
 }
 
 fn write_b_axes(f: &mut Formatter<'_>, report: &Report, boxes: &BAxis) -> fmt::Result {
-    writeln!(f, "\n{:<26}{:>18}{:>18}{:>18}", "b axis, mm", "D16", "D50", "D84")?;
+    writeln!(f, "\n{:<26}{:>9}{:>19}{:>19}", "b axis, mm", "D16", "D50", "D84")?;
     write_sizes(f, "true stones", Some(boxes.truth), None)?;
     write_sizes(f, "bounding box (PCA)", boxes.segments, boxes.error_percent)?;
     let by_run = [("ellipsoid of the run", &report.ellipsoid), ("fit of the run", &report.fit)];
@@ -137,19 +148,16 @@ fn write_sizes(
     sizes: Option<Percentiles>,
     errors: Option<Percentiles>,
 ) -> fmt::Result {
-    let Some(sizes) = sizes else { return writeln!(f, "{name:<26}{:>9}{:>18}{:>18}", "none", "none", "none") };
-    write!(f, "{name:<26}")?;
-    let errors = errors.map(Percentiles::to_array);
-    for (i, size) in sizes.to_array().into_iter().enumerate() {
-        let error = errors.map_or_else(String::new, |errors| format!("{:+.1} %", errors[i]));
-        write!(f, "{size:>9.1}{error:>9}")?;
-    }
-    writeln!(f)
+    let Some(sizes) = sizes else { return writeln!(f, "{name:<26}{:>9}{:>19}{:>19}", "none", "none", "none") };
+    let error = |i: usize| errors.map_or_else(String::new, |e| format!("{} %", percent(e.to_array()[i], true)));
+    let [d16, d50, d84] = sizes.to_array();
+    let row = format!("{d16:>9.1}{:>10}{d50:>9.1}{:>10}{d84:>9.1}{:>10}", error(0), error(1), error(2));
+    writeln!(f, "{name:<26}{}", row.trim_end())
 }
 
 fn write_references(f: &mut Formatter<'_>, references: &References) -> fmt::Result {
     let References { n, iou_over_08, rows, .. } = references;
-    writeln!(f, "\n{n} reference pebbles, {iou_over_08} with an IoU above 0.8")?;
+    writeln!(f, "\nreference pebbles: {n}, of which {iou_over_08} with an IoU above 0.8")?;
     writeln!(
         f,
         "  no  precision  recall    IoU  represented  dA mm  dB mm  dC mm  sum cm   yaw  pitch  roll  sum deg"
@@ -170,7 +178,7 @@ fn write_references(f: &mut Formatter<'_>, references: &References) -> fmt::Resu
 fn write_spheres(f: &mut Formatter<'_>, spheres: &Spheres) -> fmt::Result {
     let Spheres { n, rmse_mm, rmse_true_radius_mm, radius_bias_mm } = spheres;
     let Middle { mean, median } = rmse_mm.middle;
-    writeln!(f, "\n{n} calibration balls, distance of their surfaces from spheres (RMSE), mm")?;
+    writeln!(f, "\ncalibration balls: {n}; distances of their surfaces from spheres (RMSE), mm")?;
     writeln!(f, "{:<26}mean {mean:.3}, median {median:.3}, largest {:.3}", "of the radius that fits", rmse_mm.max)?;
     let Middle { mean, .. } = rmse_true_radius_mm.middle;
     writeln!(f, "{:<26}mean {mean:.3}, largest {:.3}", "of the true radius", rmse_true_radius_mm.max)?;

@@ -42,11 +42,8 @@ fn write<T: npyz::AutoSerialize + Copy>(path: &Path, numbers: &[T]) {
 /// What the reference prints of a score.
 fn printed(rule: &str, score: &Score) -> String {
     let mut text = format!("truth rule {rule}: {} visible pebbles, {} segments\n", score.visible, score.segments);
-    for (name, d) in
-        [("detection_majority", &score.detection_majority), ("detection_iou50", &score.detection_iou50)]
-    {
-        let shares =
-            format!("precision {:.3} recall {:.3} F1 {:.3} IoU {:.3}", d.precision, d.recall, d.f1, d.iou);
+    for (name, d) in [("detection_majority", &score.detection_majority), ("detection_iou50", &score.detection_iou50)] {
+        let shares = format!("precision {:.3} recall {:.3} F1 {:.3} IoU {:.3}", d.precision, d.recall, d.f1, d.iou);
         writeln!(text, "{name:<20} TP {:4} FP {:4} FN {:4}  {shares}", d.tp, d.fp, d.missed).unwrap();
     }
     let e = &score.errors;
@@ -54,12 +51,7 @@ fn printed(rule: &str, score: &Score) -> String {
         text,
         "errors               over_segmented_extra {}, over_segmented_pebbles {}, mostly_sand {}, phantom_ignored {}, \
          under_segmented {}, missed {}",
-        e.over_segmented_extra,
-        e.over_segmented_pebbles,
-        e.mostly_sand,
-        e.phantom_ignored,
-        e.under_segmented,
-        e.missed
+        e.over_segmented_extra, e.over_segmented_pebbles, e.mostly_sand, e.phantom_ignored, e.under_segmented, e.missed
     )
     .unwrap();
     let area = score.area.unwrap();

@@ -54,10 +54,8 @@ impl Board {
     /// The board as truth: every stone has axes 3, 2, 1 m along x, y, z and is visible.
     pub fn truth(&self) -> Truth {
         let stones = self.of_triangles().into_iter().max().map_or(0, |most| (most + 1) as usize);
-        let stone = TrueStone {
-            directions: Some([DVec3::X, DVec3::Y, DVec3::Z]),
-            ..TrueStone::of_axes([3.0, 2.0, 1.0])
-        };
+        let stone =
+            TrueStone { directions: Some([DVec3::X, DVec3::Y, DVec3::Z]), ..TrueStone::of_axes([3.0, 2.0, 1.0]) };
         Truth::new(self.points(), self.triangles(), self.of_triangles(), vec![stone; stones])
     }
 

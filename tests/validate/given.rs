@@ -1,7 +1,7 @@
 //! What people give: folders of runs, labels in files of several kinds; and what they get.
 
 use crate::board::{Board, write_npz};
-use gravelometer::validate::{Report, Validation, ValidateError, validate};
+use gravelometer::validate::{Report, ValidateError, Validation, validate};
 use std::path::{Path, PathBuf};
 
 const STONES: [&str; 5] = ["..........", ".aaaa.bb..", ".aaaa.bb..", ".aaaa.bb..", ".........."];
@@ -100,10 +100,11 @@ fn labels_of_vertices_are_taken_from_a_mesh_or_a_cloud() {
     assert_eq!(by_mesh.detection_majority.tp, 2);
     let text = std::fs::read_to_string(&mesh).unwrap();
     let (header, rest) = text.split_once("element face").unwrap();
-    let rows: String = rest.lines().skip_while(|l| *l != "end_header").take(1 + of_vertex.len()).fold(
-        String::new(),
-        |all, line| all + line + "\n",
-    );
+    let rows: String = rest
+        .lines()
+        .skip_while(|l| *l != "end_header")
+        .take(1 + of_vertex.len())
+        .fold(String::new(), |all, line| all + line + "\n");
     let cloud = folder.path().join("cloud.ply");
     std::fs::write(&cloud, format!("{header}{rows}")).unwrap();
     assert_eq!(report(&cloud, &truth).unwrap().score, by_mesh);
@@ -112,9 +113,9 @@ fn labels_of_vertices_are_taken_from_a_mesh_or_a_cloud() {
 #[test]
 fn the_folder_of_a_run_gets_scores_and_a_picture_and_its_own_axes_are_scored() {
     let (folder, truth) = place();
-    let columns = "ellipsoid_a_axis_m,ellipsoid_b_axis_m,ellipsoid_c_axis_m,a_fit_m,b_fit_m,c_fit_m,confidence,zingg_class";
-    let fields =
-        ["3.3,1.8,1.0,3,2,1,0.9,disc", ",,,3,2,1.5,0.8,rod", "9,9,9,9,9,9,0.1,rod", ",,,,,,,blade"];
+    let columns =
+        "ellipsoid_a_axis_m,ellipsoid_b_axis_m,ellipsoid_c_axis_m,a_fit_m,b_fit_m,c_fit_m,confidence,zingg_class";
+    let fields = ["3.3,1.8,1.0,3,2,1,0.9,disc", ",,,3,2,1.5,0.8,rod", "9,9,9,9,9,9,0.1,rod", ",,,,,,,blade"];
     let run = run_folder(folder.path(), columns, fields);
     let what = Validation { run: run.clone(), truth, ..Validation::default() };
     let found = validate(&what).unwrap();
@@ -142,6 +143,9 @@ fn the_folder_of_a_run_gets_scores_and_a_picture_and_its_own_axes_are_scored() {
         ("/detection_majority/fn", "0"),
         ("/errors/mostly_sand", "1"),
         ("/errors/over_segmented_extra", "1"),
+        ("/astray/further_grains", "[2]"),
+        ("/astray/sand_grains", "[3]"),
+        ("/astray/overlooked_stones", "[]"),
         ("/matched/0/pebble", "0"),
         ("/matched/0/ref", "0"),
         ("/fit/stones", "2"),
@@ -154,7 +158,9 @@ fn the_folder_of_a_run_gets_scores_and_a_picture_and_its_own_axes_are_scored() {
         assert!(json.pointer(key).is_some_and(serde_json::Value::is_number), "{key} of {json}");
     }
     let text = found.report.to_string();
-    for part in ["2 visible stones", "b axis, mm", "ellipsoid of the run", "fit of the run", "true labels would give"] {
+    for part in
+        ["2 stones count, 4 grains", "b axis, mm", "ellipsoid of the run", "fit of the run", "true labels would give"]
+    {
         assert!(text.contains(part), "{part} in\n{text}");
     }
     // Again: its own results are replaced, and nothing else is in the folder.

@@ -122,10 +122,10 @@ fn a_reference_pebble_is_listed_also_where_another_stone_has_its_grain() {
     (truth.stones[0].reference, truth.stones[1].reference) = (2, 1);
     let found = score(&truth, &Board::new(&grains).labels(), 0.0);
     let references = found.score.reference_pebbles.unwrap();
-    assert_eq!(references.rows.iter().map(|r| (r.reference, r.pebble, r.main)).collect::<Vec<_>>(), [
-        (1, 1, 0),
-        (2, 0, 1)
-    ]);
+    assert_eq!(
+        references.rows.iter().map(|r| (r.reference, r.pebble, r.main)).collect::<Vec<_>>(),
+        [(1, 1, 0), (2, 0, 1)]
+    );
     // The grain has 21 squares, the stones 6 and 12 of them.
     assert!((references.rows[0].precision - 6.0 / 21.0).abs() < 0.01 && references.rows[0].recall == 1.0);
     assert_eq!(references.iou_over_08, 0);
@@ -191,29 +191,25 @@ fn a_calibration_ball_without_noise_lies_on_its_sphere() {
 
 #[test]
 fn the_map_shows_each_kind_of_error_by_its_colour() {
-    let stones = Board::new(&["aaaa.bbbbb.", "aaaa.bbbbb.", ".....bbbbb.", "cc.dddddd..", "cc.dddddd..", "ee...f....."]);
-    let grains = Board::new(&["aaah.mmmnn.", "aaah.mmmnn.", "....hmmmnn.", ".....pppppp", ".....pppppp", "ppp..s..qq."]);
+    let stones =
+        Board::new(&["aaaa.bbbbb.", "aaaa.bbbbb.", ".....bbbbb.", "cc.dddddd..", "cc.dddddd..", "ee...f....."]);
+    let grains =
+        Board::new(&["aaah.mmmnn.", "aaah.mmmnn.", "....hmmmnn.", ".....pppppp", ".....pppppp", "ppp..s..qq."]);
     let mut truth = stones.truth();
     truth.visible[5] = false;
     let scored = score(&truth, &grains.labels(), 0.0);
     let of_square = |x: usize, y: usize| shown(&truth, &grains.labels(), &scored)[2 * (11 * y + x)];
-    assert_eq!((of_square(0, 0), of_square(3, 0), of_square(4, 2)), (
-        Shown::Split,
-        Shown::SplitFurther,
-        Shown::GrainOnly
-    ));
+    assert_eq!(
+        (of_square(0, 0), of_square(3, 0), of_square(4, 2)),
+        (Shown::Split, Shown::SplitFurther, Shown::GrainOnly)
+    );
     assert_eq!((of_square(5, 0), of_square(8, 0)), (Shown::Split, Shown::SplitFurther));
     assert_eq!((of_square(0, 3), of_square(0, 5)), (Shown::Missed, Shown::Merged));
-    assert_eq!((of_square(3, 3), of_square(5, 3), of_square(9, 3)), (
-        Shown::FoundStoneOnly,
-        Shown::Found,
-        Shown::GrainOnly
-    ));
-    assert_eq!((of_square(8, 5), of_square(10, 0), of_square(5, 5)), (
-        Shown::False,
-        Shown::Ground,
-        Shown::Ignored
-    ));
+    assert_eq!(
+        (of_square(3, 3), of_square(5, 3), of_square(9, 3)),
+        (Shown::FoundStoneOnly, Shown::Found, Shown::GrainOnly)
+    );
+    assert_eq!((of_square(8, 5), of_square(10, 0), of_square(5, 5)), (Shown::False, Shown::Ground, Shown::Ignored));
 }
 
 #[test]
