@@ -3,7 +3,7 @@
 //! A patch of gravel bar is built from a seed: stones dropped on rippled sand, seen from above as a
 //! photogrammetric survey sees it (overhanging flanks down to the view limit, nothing beyond), smoothed
 //! and noisy as such a surface is. Every triangle knows its true stone, so that a run can be scored the
-//! way the field's paper does (Rheinwalt et al. 2025): [`make_scene`], segment, [`score`].
+//! way the field's paper does (Rheinwalt et al. 2025): [`make_scene`], segment, [`score()`].
 //!
 //! ```text
 //!  placement ──> bed (implicit stones and sand) ──> voxels ──> surface ──> sight ──> finish ──> Scene
