@@ -42,7 +42,8 @@ How stones are counted (Rheinwalt, Purinton & Bookhagen 2025):
                mostly sand are false, a missed stone of which another grain holds a quarter is under-segmentation
   by overlap   found if intersection over union of the areas of grain and stone is 0.5 or more
   Grains on hidden stones, or on membranes over unseen space, are held against nobody.
-  `true labels would give`: the same scores for the truth itself, which no segmentation of this mesh can beat by much.
+  `true labels would give`: the same scores for the truth itself, measured in the same way. Stones are partly buried and
+  meshes are smooth, so that these have errors of size and attitude too, for which no segmentation is to blame.
 
 Colours of the picture:
 ";

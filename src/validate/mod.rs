@@ -7,8 +7,8 @@
 //!
 //! Four results: *detection* (which stones were found), *axes* (how long they are), *orientation* (how they lie) and
 //! *area* (how much of each stone's surface is in its grain). The true labels themselves are scored in the same way:
-//! what they get is the best that any segmentation of this mesh can get, since stones are partly buried and meshes
-//! are smooth.
+//! stones are partly buried and meshes are smooth, so that even these have errors of size and attitude, for which no
+//! segmentation is to blame.
 //!
 //! It is no stage: it knows nothing of how a segmentation was made, and measures by itself.
 

@@ -65,7 +65,7 @@ pub struct Report {
     /// How far the confidence of the run's table can be trusted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reliability: Option<Reliability>,
-    /// What the true labels themselves get, without the list of stones: the best that can be.
+    /// What the true labels themselves get, without the list of stones: errors that are not the segmentation's.
     pub perfect_labels: Score,
 }
 

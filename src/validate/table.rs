@@ -88,7 +88,7 @@ fn write_errors(f: &mut Formatter<'_>, score: &Score) -> fmt::Result {
 }
 
 fn write_axes(f: &mut Formatter<'_>, report: &Report, boxes: &AxisErrors) -> fmt::Result {
-    writeln!(f, "\n{:<26}{:^26}{:^26}{:^26}", "axes, errors in percent", "A", "B", "C")?;
+    writeln!(f, "\n{:<26}{:>13}{:>26}{:>26}", "axes, errors in percent", "A", "B", "C")?;
     writeln!(f, "{:<26}{}", "", format!("{:>10}{:>8}{:>8}", "mean |e|", "median", "bias").repeat(3))?;
     write_axis_errors(f, "bounding box (PCA)", boxes)?;
     let by_run = [("ellipsoid of the run", &report.ellipsoid), ("fit of the run", &report.fit)];
