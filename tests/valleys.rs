@@ -129,8 +129,9 @@ fn what_a_tile_with_a_thin_halo_publishes_is_true_and_what_it_does_not_is_named(
             assert!(unsettled.is_sorted_by(|a, b| a < b) && unsettled.iter().all(|&t| mesh.in_core[t as usize]));
             let unsettled: Vec<u64> = unsettled.iter().map(|&t| mesh.triangle_id(t)).collect();
             let own = |g: &&(Vec<u64>, _)| mesh.triangle_runs.local(g.0[0]).is_some_and(|t| mesh.in_core[t as usize]);
-            let (later, now): (Vec<&(Vec<u64>, _)>, Vec<&(Vec<u64>, _)>) =
-                truth.iter().filter(own).partition(|g| unsettled.binary_search(&g.0[0]).is_ok());
+            let named = |g: &(Vec<u64>, _)| unsettled.binary_search(&g.0[0]).is_ok();
+            let later: Vec<_> = truth.iter().filter(own).filter(|g| named(g)).collect();
+            let now: Vec<_> = truth.iter().filter(own).filter(|g| !named(g)).collect();
             assert_eq!(now, found.iter().collect::<Vec<_>>(), "{name}, core {core:?}, loaded {block:?}");
             if unsettled.is_empty() {
                 assert!(later.is_empty());
