@@ -24,7 +24,11 @@ use gravelometer::tile::{CoreSize, Owned, Plan, TileMesh, read_of};
 use std::convert::Infallible;
 use support::bed::{Rng, bed, shuffled};
 
-const WANTED: Wanted = Wanted { outline_step_m: 1.0 / 1_048_576.0, triangle_ids: true };
+const WANTED: Wanted = Wanted {
+    outline_step_m: 1.0 / 1_048_576.0,
+    shape_prior: gravelometer::settings::ShapePrior::RIVER_GRAVEL,
+    triangle_ids: true,
+};
 
 #[derive(Debug, Clone, Copy)]
 struct Tiling {

@@ -122,6 +122,12 @@ pub const COLUMNS: &[Column] = columns! {
     "ellipsoid_a_axis_m" Real "long axis of the least-squares ellipsoid; none where no ellipsoid fits" |r| Value::maybe(r.grain.ellipsoid_axes_m.map(|e| e[0]));
     "ellipsoid_b_axis_m" Real "intermediate axis of the same" |r| Value::maybe(r.grain.ellipsoid_axes_m.map(|e| e[1]));
     "ellipsoid_c_axis_m" Real "short axis of the same" |r| Value::maybe(r.grain.ellipsoid_axes_m.map(|e| e[2]));
+    "a_fit_m" Real "long axis of the completed stone: a rounded body fitted to the visible part, and to the usual shape of stones; none where too little is seen" |r| Value::maybe(r.grain.completed.map(|c| c.axes_m[0]));
+    "b_fit_m" Real "intermediate axis of the completed stone" |r| Value::maybe(r.grain.completed.map(|c| c.axes_m[1]));
+    "c_fit_m" Real "short axis of the completed stone, with what is buried" |r| Value::maybe(r.grain.completed.map(|c| c.axes_m[2]));
+    "c_fit_error_m" Real "one standard deviation of c_fit_m" |r| Value::maybe(r.grain.completed.map(|c| c.c_error_m));
+    "seen_share" Real "share of the completed stone's surface that is visible, 0 to 1" |r| Value::maybe(r.grain.completed.map(|c| c.seen_share));
+    "c_fit_from_prior" Boolean "c_fit_m rests more on measure.prior_c_over_b than on the surface" |r| r.grain.completed.map_or(Value::Null, |c| Value::Boolean(c.c_from_prior));
     "yaw_deg" Real "ZYX Tait-Bryan angle about the vertical that turns east-north-up into a-b-c, east towards north" |r| Value::real(r.attitude.yaw_deg);
     "pitch_deg" Real "second angle of the same, positive with a downward" |r| Value::real(r.attitude.pitch_deg);
     "roll_deg" Real "third angle of the same, about a" |r| Value::real(r.attitude.roll_deg);
