@@ -131,10 +131,10 @@ pub const COLUMNS: &[Column] = columns! {
     "yaw_deg" Real "ZYX Tait-Bryan angle about the vertical that turns east-north-up into a-b-c, east towards north" |r| Value::real(r.attitude.yaw_deg);
     "pitch_deg" Real "second angle of the same, positive with a downward" |r| Value::real(r.attitude.pitch_deg);
     "roll_deg" Real "third angle of the same, about a" |r| Value::real(r.attitude.roll_deg);
-    "a_trend_deg" Real "azimuth of the lower end of a, clockwise from grid north; none where a is vertical" |r| Value::maybe(r.attitude.a_trend_deg);
+    "a_trend_deg" Real "azimuth of the lower end of a, clockwise from grid north; none where a is vertical, arbitrary where near_equant_ab" |r| Value::maybe(r.attitude.a_trend_deg);
     "a_plunge_deg" Real "angle of a below the horizon, 0 to 90" |r| Value::real(r.attitude.a_plunge_deg);
     "ab_dip_deg" Real "dip of the a-b plane from the horizontal, 0 to 90" |r| Value::real(r.attitude.ab_dip_deg);
-    "ab_dip_direction_deg" Real "azimuth of steepest descent of the a-b plane, clockwise from grid north; none where it is level" |r| Value::maybe(r.attitude.ab_dip_direction_deg);
+    "ab_dip_direction_deg" Real "azimuth of steepest descent of the a-b plane, clockwise from grid north; none where it is level, arbitrary where near_equant_bc" |r| Value::maybe(r.attitude.ab_dip_direction_deg);
     "red_mean" Real "mean of the vertices' red, 0 to 1; none where the mesh has no colours" |r| color(r.grain.color_mean, 0);
     "green_mean" Real "mean green" |r| color(r.grain.color_mean, 1);
     "blue_mean" Real "mean blue" |r| color(r.grain.color_mean, 2);
@@ -158,8 +158,8 @@ pub const COLUMNS: &[Column] = columns! {
     "triangles" Integer "number of triangles" |r| whole(r.grain.triangles);
     "touches_edge" Boolean "an edge of the mesh (survey border, scan shadow) bounds the grain: sizes are lower bounds" |r| Value::Boolean(r.grain.touches_edge);
     "few_triangles" Boolean "fewer triangles than measure.few_triangles: sizes are coarse" |r| Value::Boolean(r.grain.triangles < r.settings.measure.few_triangles);
-    "near_equant_ab" Boolean "a/b below measure.equant_ratio: yaw, pitch, roll, trend and plunge are undefined" |r| Value::Boolean(near_equant(r.grain.axes_m, &r.settings.measure).0);
-    "near_equant_bc" Boolean "b/c below measure.equant_ratio: roll, dip and dip direction are undefined" |r| Value::Boolean(near_equant(r.grain.axes_m, &r.settings.measure).1);
+    "near_equant_ab" Boolean "a/b below measure.equant_ratio: yaw, pitch, roll, trend and plunge are given but undefined" |r| Value::Boolean(near_equant(r.grain.axes_m, &r.settings.measure).0);
+    "near_equant_bc" Boolean "b/c below measure.equant_ratio: roll, dip and dip direction are given but undefined" |r| Value::Boolean(near_equant(r.grain.axes_m, &r.settings.measure).1);
 };
 
 fn whole(value: u64) -> Value {
