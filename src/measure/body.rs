@@ -70,24 +70,44 @@ struct Offset {
     slope: [f64; 9],
 }
 
-impl Body {
-    /// Distance to first order, exact along the axes to third: (S^(2/5) - 1) over the length of its gradient.
+/// A body, ready for many points: its centre, the turn into its frame, one over its semi-axes.
+struct Prepared {
+    centre: DVec3,
+    into: DMat3,
+    per_semi: DVec3,
+}
+
+impl Prepared {
+    /// Distance to first order, along the axes to third: (S^(2/5) - 1) over the length of its gradient.
+    #[inline(always)]
     fn offset(&self, point: DVec3) -> Offset {
-        let u = self.turn.transpose() * (point - self.centre);
-        let q = u / self.semi;
+        let u = self.into * (point - self.centre);
+        let q = u * self.per_semi;
         let plan = q.x * q.x + q.y * q.y;
         let (plan_root, z_root) = (plan.sqrt().sqrt(), q.z.abs().sqrt());
         let excess = plan * plan_root + q.z * q.z * z_root - 1.0;
         let by_share = DVec3::new(q.x * plan_root, q.y * plan_root, q.z * z_root) * 2.5;
-        let gradient = by_share / self.semi;
-        let steepness = gradient.length().max(1e-12);
-        let normal = gradient / steepness;
-        let stretch = by_share * q / steepness;
+        let gradient = by_share * self.per_semi;
+        let flatness = 1.0 / gradient.length().max(1e-12);
+        let normal = gradient * flatness;
+        let stretch = by_share * q * flatness;
         let lever = u.cross(normal);
         Offset {
-            distance: excess * (1.0 + ABOVE * excess) / ((1.0 + BELOW * excess) * steepness),
+            distance: excess * (1.0 + ABOVE * excess) / (1.0 + BELOW * excess) * flatness,
             slope: [-normal.x, -normal.y, -normal.z, -stretch.x, -stretch.y, -stretch.z, -lever.x, -lever.y, -lever.z],
         }
+    }
+
+    /// [`Prepared::offset`] without the slopes.
+    fn distance(&self, point: DVec3) -> f64 {
+        self.offset(point).distance
+    }
+}
+
+impl Body {
+    /// The body with what all its points share.
+    fn prepared(&self) -> Prepared {
+        Prepared { centre: self.centre, into: self.turn.transpose(), per_semi: self.semi.recip() }
     }
 
     /// Half the width along a unit vector (of the ellipsoid with the same axes), and how the semi-axes'
@@ -139,9 +159,9 @@ impl Body {
 
     /// The sum that the fit minimises, in units of variances.
     fn badness(&self, seen: &Seen, prior: &ShapePrior) -> f64 {
-        let mut sum = 0.0;
+        let (mut sum, at) = (0.0, self.prepared());
         for (&point, &share) in seen.points.iter().zip(seen.shares) {
-            let r = self.offset(point).distance / ROBUST;
+            let r = at.distance(point) * (1.0 / ROBUST);
             sum += share * 2.0 * ((1.0 + r * r).sqrt() - 1.0);
         }
         sum *= DATA_WEIGHT * ROBUST * ROBUST;
@@ -151,19 +171,18 @@ impl Body {
     /// Curvature (half the second derivatives, first order) and half the slope of that sum.
     fn normal_equations(&self, seen: &Seen, prior: &ShapePrior) -> (Matrix9, Vector9) {
         let (mut curvature, mut slope) = ([[0.0; 9]; 9], [0.0; 9]);
+        // Whole rows: half of them would be fewer products and more time.
         let mut add = |weight: f64, off: f64, by: &[f64; 9]| {
-            for i in 0..9 {
-                let weighted = weight * by[i];
-                slope[i] += weighted * off;
-                // Whole rows are faster than half of them.
-                for j in 0..9 {
-                    curvature[i][j] += weighted * by[j];
-                }
+            let weighted = by.map(|b| weight * b);
+            for (row, w) in curvature.iter_mut().zip(weighted) {
+                row.iter_mut().zip(by).for_each(|(sum, b)| *sum += w * b);
             }
+            slope.iter_mut().zip(weighted).for_each(|(sum, w)| *sum += w * off);
         };
+        let at = self.prepared();
         for (&point, &share) in seen.points.iter().zip(seen.shares) {
-            let offset = self.offset(point);
-            let r = offset.distance / ROBUST;
+            let offset = at.offset(point);
+            let r = offset.distance * (1.0 / ROBUST);
             add(DATA_WEIGHT * share / (1.0 + r * r).sqrt(), offset.distance, &offset.slope);
         }
         for (off, by) in &self.expectations(seen, prior) {
@@ -191,8 +210,9 @@ impl Body {
             }
         }
         let inverse = curvature.cholesky()?.inverse();
+        let at = body.prepared();
         let square = seen.points.iter().zip(seen.shares).fold(0.0, |sum, (&point, &share)| {
-            let distance = body.offset(point).distance;
+            let distance = at.distance(point);
             sum + share * distance * distance
         });
         let covariance = [3, 4, 5].map(|i| [3, 4, 5].map(|j| inverse[(i, j)]));

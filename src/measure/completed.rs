@@ -123,6 +123,7 @@ impl Along {
         let step = (self.high - self.low).max_element() / CELLS;
         let first = (self.low / step).floor();
         let [nx, ny, nz] = ((self.high / step).floor() - first).to_array().map(|n| n as usize + 1);
+        let (origin, per_m) = (first * step, 1.0 / step);
         let mut cells = vec![(DVec3::ZERO, 0.0); nx * ny * nz];
         let (mut area_m2, mut facing) = (0.0, 0.0);
         for &[i, j, k] in &patch.corners {
@@ -130,9 +131,9 @@ impl Along {
             let normal = (q - p).cross(r - p);
             let area = 0.5 * normal.length();
             let centroid = (p + q + r) / 3.0;
-            let at = (centroid / step).floor() - first;
-            // Rounding may put a centroid just outside.
-            let [x, y, z] = [(at.x, nx), (at.y, ny), (at.z, nz)].map(|(c, n)| (c.max(0.0) as usize).min(n - 1));
+            // Rounding may put a centroid just outside; below 0 becomes 0.
+            let at = (centroid - origin) * per_m;
+            let [x, y, z] = [(at.x, nx), (at.y, ny), (at.z, nz)].map(|(c, n)| (c as u32 as usize).min(n - 1));
             let (moment, sum) = &mut cells[(x * ny + y) * nz + z];
             *moment += centroid * area;
             *sum += area;
