@@ -267,6 +267,11 @@ mod tests {
     fn a_value_out_of_range_is_refused_with_its_key() {
         let error = Settings::load(None, &["segment.min_sphericity=1.5".into()]).expect_err("range").to_string();
         assert!(error.contains("segment.min_sphericity = 1.5"), "{error}");
+        for (key, value) in [("prior_c_over_b", "1.2"), ("prior_b_over_a", "0"), ("prior_c_over_b_spread", "0.01")] {
+            let assignment = format!("measure.{key}={value}");
+            let error = Settings::load(None, &[assignment]).expect_err(key).to_string();
+            assert!(error.contains(&format!("measure.{key} = {value}: must lie in ")), "{error}");
+        }
     }
 
     #[test]

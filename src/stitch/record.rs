@@ -207,7 +207,7 @@ mod tests {
             );
             all.extend([g.top_z, g.surface_area_m2, g.hull_area_m2, g.hull_volume_m3, g.footprint_area_m2]);
             all.extend(g.axes_m);
-            for c in &g.completed {
+            if let Some(c) = &g.completed {
                 all.extend(c.axes_m);
                 all.extend([c.c_error_m, c.seen_share]);
             }
