@@ -62,7 +62,7 @@ pub fn grain_cores(index: &Index, settings: &Settings, threads: usize, memory: u
         let plan = Plan::new(index, largest);
         let survey = Survey { index, plan: &plan, instructions: InstructionSet::best() };
         // The halos of small cores are wider than the rest of them.
-        let fits = survey.largest_bytes(&settings.segment) as f64 <= SHARE_OF_CUT * memory as f64;
+        let fits = survey.largest_bytes(settings) as f64 <= SHARE_OF_CUT * memory as f64;
         if fits || least == 1.0 || (largest.columns, largest.rows) == (1, 1) {
             return GrainCores { largest, divisible };
         }

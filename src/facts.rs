@@ -96,7 +96,7 @@ pub fn facts(reach: &Reach, index: &Index, plan: &Plan, warnings: &[String], los
         "core_m": plan.core_m(index),
         "mean_edge_m": index.scale.mean_edge_m,
         "mean_triangle_area_m2": index.scale.mean_triangle_area_m2,
-        "spacing_m": index.scale.spacing_m,
+        "spacing_m": Some(index.scale.spacing_m).filter(|spacing_m| *spacing_m > 0.0),
         "zero_area_triangles": index.scale.zero_area_triangles,
     })
 }

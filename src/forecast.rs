@@ -137,7 +137,7 @@ pub fn tiles_bytes(
     threads: usize,
     (memory, fixed): (u64, u64),
 ) -> Result<u64, ForecastError> {
-    let largest = survey.largest_bytes(&settings.segment);
+    let largest = survey.largest_bytes(settings);
     if largest > memory {
         let (what, otherwise) = ("the run, with its largest tile,", "a smaller --tile-size");
         return Err(ForecastError::Memory { what, needed: largest + fixed, memory: memory + fixed, otherwise });

@@ -1,8 +1,9 @@
 //! The page that shows the river: from files to files.
 
 use crate::costs::{Costs, Meter};
-use crate::curvature::{InstructionSet, Stencil};
-use crate::cuts::{GrainCores, curvature_core, grain_cores};
+use crate::curvature::InstructionSet;
+use crate::cuts::{GrainCores, grain_cores};
+use crate::divergence::Divergence;
 use crate::error::Error;
 use crate::facts::{facts, oddities, oddities_of_cloud};
 use crate::forecast;
@@ -10,12 +11,12 @@ use crate::index::{BuildRoom, Index};
 use crate::measure::Wanted;
 use crate::open::{Reach, Surface, resolve_inputs};
 use crate::opening::open_survey;
-use crate::passes::{Probe, Recipe, Survey};
+use crate::passes::{Probe, Recipe, Survey, Telling};
 use crate::pipeline::{Budget, Control, Crew, LostJob, beside, memory_there_bytes, return_free_memory};
 use crate::progress::{Progress, Unit};
-use crate::resume::{Curvature, ResumeError, WORK, WorkFolder, changes_since_finished, whole_identity};
+use crate::resume::{ResumeError, WORK, WorkFolder, changes_since_finished, whole_identity};
 use crate::segment::smallest_grain_area_m2;
-use crate::settings::{Instructions, Settings};
+use crate::settings::{Instructions, Method, Settings};
 use crate::statistics::RasterGrid;
 use crate::stitch::{Catalogue, TileReport, stitch};
 use crate::store::Shelf;
@@ -140,47 +141,45 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let weld = work.weld_facts();
     warnings.extend(tell_of_weld(&reach, weld.as_ref(), progress));
 
-    // plan, and tile by tile: spacing; the disk takes the index meanwhile, also that of a run that is to stop
+    // plan; the disk takes the index meanwhile, also that of a run that is to stop
     // Labels go back onto the surface; nothing else needs it any more.
     whole = whole.filter(|whole| labelled && whole.cloud().is_some());
     let keep = || if made { work.keep_index(&reach, settings, &index) } else { Ok(()) };
     let (kept, planned) = beside(keep, || {
         control.check()?;
         check_outputs(&reach, &index, settings)?;
-        let mut curvature = work.curvature(&reach, &index, settings)?;
-        let plans = plans(&index, &mut curvature, settings, (threads, budget), progress)?;
-        let survey = Survey { index: &index, plan: &plans.vertices, instructions };
-        let spacing_m = curvature.spacing_m(|| spacing_m(&survey, &crew, progress))?;
-        Ok::<_, Error>((curvature, plans, spacing_m))
+        let cores = plan_grains(&index, settings, (threads, budget), progress)?;
+        // tile by tile: curvature, if the method asks for that of the whole survey
+        let divergence = match settings.segment.method {
+            Method::Valleys => None,
+            Method::Rheinwalt2025 => {
+                let means = (&crew, instructions, budget.0);
+                Some(Divergence::of((&reach, &index), &work, settings, means, progress)?)
+            }
+        };
+        Ok::<_, Error>((cores, divergence))
     });
     kept.inspect_err(|_| work.give_up_index())?;
-    let (mut curvature, plans, spacing_m) = planned?;
-    index.scale.spacing_m = spacing_m;
-
-    // tile by tile: curvature
-    let stencil = Stencil::new(index.scale.spacing_m, index.scale.mean_triangle_area_m2, &settings.curvature);
-    let survey = Survey { index: &index, plan: &plans.vertices, instructions };
-    let jobs = curvature.missing(&index, &plans.vertices)?;
-    let (mut loaded, mut owned) = (0, 0);
-    let lost = survey.divergence(&crew, &jobs, &stencil, progress, |job, core| {
-        loaded += core.loaded;
-        owned += survey.owned_triangles(job);
-        curvature.add(plans.vertices.tiles[job].id, &core.runs, &core.values)
-    })?;
-    none_lost("curvature", lost)?;
-    curvature.sync()?;
+    let (cores, divergence) = planned?;
+    index.scale.spacing_m = divergence.as_ref().map_or(0.0, |d| d.spacing_m);
+    let curvature_per_triangle = divergence.as_ref().and_then(|d| d.loaded_per_triangle);
 
     // tile by tile: segment and measure
     let outline_step_m = reach.frame().outline_step_m();
     let wanted = Wanted { outline_step_m, shape_prior: settings.measure.shape_prior(), triangle_ids: labelled };
-    let recipe =
-        Recipe { settings: &settings.segment, divergence: curvature.divergence(), wanted, usual_width_m: None };
-    let probe = match plans.cores.divisible || plans.grains.tiles.len() > 1 {
+    let method = match &divergence {
+        None => Telling::Valleys(&settings.valleys),
+        Some(divergence) => Telling::Rheinwalt2025(divergence.column()),
+    };
+    let recipe = Recipe { settings: &settings.segment, method, wanted, usual_width_m: None };
+    let largest = Plan::new(&index, cores.largest);
+    let survey = Survey { index: &index, plan: &largest, instructions };
+    let probe = match cores.divisible || largest.tiles.len() > 1 {
         true => crew.pool.install(|| survey.probe(&recipe))?,
         false => Probe::default(),
     };
     let recipe = Recipe { usual_width_m: probe.usual_width_m, ..recipe };
-    let plan = Plan::new(&index, findings.core(plans.cores.size(&index, threads, probe.usual_width_m))?);
+    let plan = Plan::new(&index, findings.core(cores.size(&index, threads, probe.usual_width_m))?);
     let survey = Survey { index: &index, plan: &plan, instructions };
     // An interrupted run may have had more memory, and larger tiles.
     forecast::tiles_bytes(&survey, settings, threads, budget)?;
@@ -207,7 +206,6 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let mut facts = facts(&reach, &index, &plan, &warnings, &lost);
     let segmented_per_triangle = segmented_per_triangle(&tiles, probe.segmented);
     facts["segmented_per_triangle"] = segmented_per_triangle.into();
-    let curvature_per_triangle = (owned > 0).then(|| loaded as f64 / owned as f64);
     facts["curvature_per_triangle"] = curvature_per_triangle.into();
     facts["identity"] = whole_identity(&reach, settings).into();
     facts["weld"] = serde_json::json!(weld);
@@ -233,7 +231,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     };
     let files = crew.pool.install(|| write(&folder, &results, progress, control))?;
     if lost.is_empty() {
-        drop((index, curvature, findings));
+        drop((index, divergence, findings));
         work.finish();
     }
     let (triangles, costs) = (scale.triangles, meter.costs());
@@ -288,26 +286,14 @@ fn make_index(
     Ok(index)
 }
 
-/// How a survey is cut.
-struct Plans {
-    /// Into tiles of the passes that store one number for each vertex.
-    vertices: Plan,
-    /// Into the fewest tiles of the grain pass.
-    grains: Plan,
-    /// What is known of these.
-    cores: GrainCores,
-}
-
-/// `budget` is the memory for tiles and what else is taken, bytes.
-fn plans(
+/// How the survey is cut for the grain pass, and whether that fits. `budget` is the memory for tiles and what else is
+/// taken, bytes.
+fn plan_grains(
     index: &Index,
-    curvature: &mut Curvature,
     settings: &Settings,
     (threads, budget): (usize, (u64, u64)),
     progress: &dyn Progress,
-) -> Result<Plans, Error> {
-    let core = curvature_core(index, settings, threads, budget.0);
-    let vertices = Plan::new(index, curvature.core(core)?);
+) -> Result<GrainCores, Error> {
     let cores = grain_cores(index, settings, threads, budget.0);
     let grains = Plan::new(index, cores.largest);
     let survey = Survey { index, plan: &grains, instructions: InstructionSet::best() };
@@ -321,13 +307,7 @@ fn plans(
         (tiles_bytes + budget.1) >> 20,
         (budget.0 + budget.1) >> 20
     ));
-    Ok(Plans { vertices, grains, cores })
-}
-
-fn spacing_m(survey: &Survey, crew: &Crew, progress: &dyn Progress) -> Result<f64, Error> {
-    let (spacing_m, lost) = survey.spacing(crew, progress)?;
-    none_lost("spacing", lost)?;
-    if spacing_m > 0.0 { Ok(spacing_m) } else { Err(Error::NoSpacing) }
+    Ok(cores)
 }
 
 /// Refuses what cannot be written before the long work begins.
@@ -347,14 +327,6 @@ fn check_labels(reach: &Reach, settings: &Settings) -> Result<(), Error> {
         return Err(WriteError::TooManyVertices { vertices: reach.vertices() }.into());
     }
     Ok(())
-}
-
-/// A pass on which everything depends: none of its tiles may be lost.
-fn none_lost(pass: &'static str, lost: Vec<LostJob>) -> Result<(), Error> {
-    match lost.into_iter().next() {
-        Some(lost) => Err(Error::TileFailed { pass, lost }),
-        None => Ok(()),
-    }
 }
 
 fn write(

@@ -120,7 +120,8 @@ fn measured(surface: &MemorySurface) -> Grain {
     let all = index.grid.all();
     let mesh = TileMesh::load(&index, Owned::Cells(&all), &all).unwrap();
     let inputs = index.vertex_inputs(0..index.scale.vertices).unwrap();
-    let segment = Segment { triangles: (0..mesh.triangles.len() as u32).collect(), at_mesh_edge: false };
+    let segment =
+        Segment { triangles: (0..mesh.triangles.len() as u32).collect(), at_mesh_edge: false, evidence: None };
     let wanted = Wanted {
         outline_step_m: 1.0 / 1_048_576.0,
         shape_prior: gravelometer::settings::ShapePrior::RIVER_GRAVEL,

@@ -55,6 +55,44 @@ pub fn flatter_than(points: &[DVec3], threshold: f64) -> bool {
     hull(points).is_some_and(|exact| sphericity(exact.volume_m3, exact.area_m2) < threshold)
 }
 
+/// The planes that touch the convex hull of some points in [`PAIRS_FOR_DEPTH`] pairs of directions.
+#[derive(Debug, Clone)]
+pub struct Supports {
+    origin: DVec3,
+    planes: Vec<(DVec3, f64)>,
+}
+
+impl Supports {
+    /// Around some points.
+    pub fn of(points: &[DVec3]) -> Supports {
+        let Some(&origin) = points.first() else { return Supports { origin: DVec3::ZERO, planes: Vec::new() } };
+        Supports { origin, planes: supports(points, PAIRS_FOR_DEPTH).1 }
+    }
+
+    /// How far a point lies below the nearest of the planes, in the unit of the points; negative outside.
+    pub fn depth(&self, point: DVec3) -> f64 {
+        let point = point - self.origin;
+        self.planes.iter().map(|(direction, level)| level - direction.dot(point)).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// How far points lie, in the mean, below the [`Supports`] of others, in the unit of both. Of many points every so-many-th
+/// is asked.
+pub fn mean_depth(hull_of: &[DVec3], points: &[DVec3]) -> f64 {
+    if hull_of.is_empty() || points.is_empty() {
+        return 0.0;
+    }
+    let supports = Supports::of(hull_of);
+    let step = (points.len() / MOST_DEPTHS).max(1);
+    let asked = points.len().div_ceil(step);
+    points.iter().step_by(step).map(|&p| supports.depth(p)).sum::<f64>() / asked as f64
+}
+
+/// About 0.25 rad apart: of a ball, the planes lie 0.4 % of its radius off.
+const PAIRS_FOR_DEPTH: usize = 100;
+/// Points whose depth is asked; at most twice as many.
+const MOST_DEPTHS: usize = 400;
+
 /// Pairs of opposite directions in which the hull is bounded, at first and where that leaves it open: about 0.6 and
 /// 0.4 rad apart.
 const PAIRS: [usize; 2] = [14, 32];

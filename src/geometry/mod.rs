@@ -9,7 +9,7 @@ mod polytope;
 mod quickhull;
 
 pub use glam::DVec3;
-pub use hull::{Hull, flatter_than, hull, sphericity};
+pub use hull::{Hull, Supports, flatter_than, hull, mean_depth, sphericity};
 
 use serde::{Deserialize, Serialize};
 
@@ -25,6 +25,9 @@ pub struct PlanBox {
 impl PlanBox {
     /// The box that holds nothing; growing it by a point makes it that point.
     pub const EMPTY: PlanBox = PlanBox { min: [f64::INFINITY; 2], max: [f64::NEG_INFINITY; 2] };
+
+    /// The box that holds everything.
+    pub const EVERYWHERE: PlanBox = PlanBox { min: [f64::NEG_INFINITY; 2], max: [f64::INFINITY; 2] };
 
     /// Grows the box to hold the point (x, y of `p`).
     pub fn include(&mut self, p: DVec3) {

@@ -20,7 +20,8 @@ pub struct Scale {
     pub mean_triangle_area_m2: f64,
     /// Mean length of the triangles' edges (an edge counts once per triangle), metres.
     pub mean_edge_m: f64,
-    /// Mean distance from a vertex that triangles use to the nearest triangle centroid, metres.
+    /// Mean distance from a vertex that triangles use to the nearest triangle centroid, metres; 0 where
+    /// no step of the method asks for it.
     pub spacing_m: f64,
     /// Triangles of zero area.
     pub zero_area_triangles: u64,

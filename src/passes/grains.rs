@@ -6,8 +6,9 @@ use crate::index::{CellBlock, Colors};
 use crate::measure::{Grain, Wanted, measure};
 use crate::pipeline::{Crew, LostJob, Reservation, Stages, Stopped, over_jobs};
 use crate::progress::{Progress, Unit};
+use crate::segment::valleys::segment_along_valleys;
 use crate::segment::{OversizePiece, Settled, segment};
-use crate::settings::SegmentSettings;
+use crate::settings::{SegmentSettings, Settings, ValleySettings};
 use crate::stitch::{TileFinding, TileReport};
 use crate::store::{Column, StoreError, panic_point};
 use crate::tile::{Owned, TileMesh, read_of};
@@ -18,13 +19,32 @@ use rayon::prelude::*;
 pub struct Recipe<'a> {
     /// What makes a grain.
     pub settings: &'a SegmentSettings,
-    /// Divergence of every vertex of the survey, 1/m.
-    pub divergence: &'a Column<f64>,
+    /// How stones are told apart.
+    pub method: Telling<'a>,
     /// What to measure.
     pub wanted: Wanted,
     /// How wide most grains are in plan, metres, if that is known: how far a tile looks at first. Never changes
     /// a result.
     pub usual_width_m: Option<f64>,
+}
+
+impl Recipe<'_> {
+    /// How far the steps look beyond a body, mean edge lengths.
+    fn reach_edges(&self) -> f64 {
+        match self.method {
+            Telling::Valleys(settings) => settings.reach_edges(),
+            Telling::Rheinwalt2025(_) => self.settings.reach_edges(),
+        }
+    }
+}
+
+/// How stones are told apart, with what that takes.
+#[derive(Clone, Copy)]
+pub enum Telling<'a> {
+    /// Along valleys.
+    Valleys(&'a ValleySettings),
+    /// As published, from the divergence of every vertex of the survey, 1/m.
+    Rheinwalt2025(&'a Column<f64>),
 }
 
 /// Threads that a large tile of the grain pass keeps busy by itself. Two were measured: 1.9 times one.
@@ -96,27 +116,28 @@ impl Survey<'_> {
     }
 
     /// Bytes that the largest tile takes at first.
-    pub fn largest_bytes(&self, settings: &SegmentSettings) -> u64 {
-        let block = |job| self.grown(self.core(job), self.halo(self.core(job), settings, None, 0));
+    pub fn largest_bytes(&self, settings: &Settings) -> u64 {
+        let reach_edges = settings.reach_edges();
+        let block =
+            |job| self.grown(self.core(job), self.halo(self.core(job), &settings.segment, (reach_edges, None), 0));
         let triangles = |job| self.triangles_in(&block(job));
         TileMesh::footprint_bytes((0..self.plan.tiles.len()).map(triangles).max().unwrap_or(0))
     }
 
-    /// The rings of triangles that the steps look beyond a body, cells.
-    fn rings(&self, settings: &SegmentSettings) -> f64 {
-        let rings = settings.erosion_iterations + settings.dilation_iterations + 2;
-        f64::from(rings) * 3.0 * self.index.scale.mean_edge_m / self.index.grid.cell_m
-    }
-
     /// How far a tile looks in its first attempt, the second, and so on.
-    fn halo(&self, core: &CellBlock, settings: &SegmentSettings, usual_width_m: Option<f64>, attempt: i32) -> Halo {
+    fn halo(
+        &self,
+        core: &CellBlock,
+        settings: &SegmentSettings,
+        (reach_edges, usual_width_m): (f64, Option<f64>),
+        attempt: i32,
+    ) -> Halo {
         let cell_m = self.index.grid.cell_m;
+        let reach = reach_edges * self.index.scale.mean_edge_m / cell_m;
         let core_width = f64::from((core.columns.end - core.columns.start).max(core.rows.end - core.rows.start));
         let widest = if settings.max_grain_m > 0.0 { settings.max_grain_m / cell_m } else { f64::MAX };
         let width = usual_width_m.map_or(UNKNOWN_WIDTH * core_width, |m| m / cell_m).min(widest);
-        let cells = |widths: f64, attempt: i32| {
-            ((self.rings(settings) + widths * width) * FURTHER.powi(attempt.max(0))).ceil() as u32
-        };
+        let cells = |widths: f64, attempt: i32| ((reach + widths * width) * FURTHER.powi(attempt.max(0))).ceil() as u32;
         // What is open after the first attempt mostly went on to the north.
         let (other, north) = (cells(OTHER_WIDTHS, attempt - 1), cells(NORTH_WIDTHS, attempt));
         Halo { south: other, beside: other, north }
@@ -124,7 +145,7 @@ impl Survey<'_> {
 
     fn first_block(&self, job: usize, recipe: &Recipe) -> CellBlock {
         let core = self.core(job);
-        self.grown(core, self.halo(core, recipe.settings, recipe.usual_width_m, 0))
+        self.grown(core, self.halo(core, recipe.settings, (recipe.reach_edges(), recipe.usual_width_m), 0))
     }
 
     fn grown(&self, block: &CellBlock, halo: Halo) -> CellBlock {
@@ -146,7 +167,7 @@ impl Survey<'_> {
         let mut attempt = 1;
         while !open.is_empty() {
             let mut still_open = Vec::new();
-            let halo = self.halo(core, recipe.settings, recipe.usual_width_m, attempt);
+            let halo = self.halo(core, recipe.settings, (recipe.reach_edges(), recipe.usual_width_m), attempt);
             for cluster in clusters(self.index, &open, halo.beside) {
                 let block = self.grown(&cluster.cells, halo);
                 let triangles = self.triangles_in(&block);
@@ -199,8 +220,14 @@ impl Survey<'_> {
         recipe: &Recipe,
     ) -> Result<(TileMesh, Settled), TileError> {
         let mesh = TileMesh::load(self.index, owned, block)?;
-        let divergence = read_of(recipe.divergence, &mesh.vertex_runs)?;
-        let settled = segment(&mesh, &divergence, &self.index.scale, recipe.settings, &mut |_, _| {});
+        let scale = &self.index.scale;
+        let settled = match recipe.method {
+            Telling::Valleys(settings) => segment_along_valleys(&mesh, scale, recipe.settings, settings),
+            Telling::Rheinwalt2025(divergence) => {
+                let divergence = read_of(divergence, &mesh.vertex_runs)?;
+                segment(&mesh, &divergence, scale, recipe.settings, &mut |_, _| {})
+            }
+        };
         Ok((mesh, settled))
     }
 

@@ -9,7 +9,7 @@ mod grains;
 mod per_vertex;
 mod probe;
 
-pub use grains::{Recipe, tiles_at_once};
+pub use grains::{Recipe, Telling, tiles_at_once};
 pub use per_vertex::CoreValues;
 pub use probe::Probe;
 

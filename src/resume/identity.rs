@@ -1,7 +1,7 @@
 //! What a run is a run of: everything that its result depends on, name by name.
 
 use crate::open::Reach;
-use crate::settings::Settings;
+use crate::settings::{Method, Settings};
 use crate::triangulate::METHOD;
 use serde_json::{Map, Value};
 use twox_hash::XxHash3_64;
@@ -53,6 +53,13 @@ impl Identity {
     /// With what the grains of a tile depend on as well.
     pub(super) fn and_grains(mut self, settings: &Settings, outline_step_m: f64) -> Identity {
         self.add("segment", serde_json::json!(settings.segment));
+        self = match settings.segment.method {
+            Method::Rheinwalt2025 => self.and_curvature(settings),
+            Method::Valleys => {
+                self.add("valleys", serde_json::json!(settings.valleys));
+                self
+            }
+        };
         self.0.insert("output.labelled_mesh".into(), settings.output.labelled_mesh.into());
         self.0.insert("output.labelled_cloud".into(), settings.output.labelled_cloud.into());
         self.0.insert("step of outlines, metres".into(), outline_step_m.to_string().into());

@@ -170,8 +170,7 @@ impl WorkFolder {
     /// What is resumed was another run, or the disk says no.
     pub fn begin(&mut self, reach: &Reach, settings: &Settings, resume: bool) -> Result<Findings, Error> {
         let outline_step_m = reach.frame().outline_step_m();
-        let identity =
-            Identity::of_survey(reach, settings).and_curvature(settings).and_grains(settings, outline_step_m);
+        let identity = Identity::of_survey(reach, settings).and_grains(settings, outline_step_m);
         if !resume {
             // What is not resumed must not be found later.
             self.shelf.remove(GRAINS);

@@ -30,8 +30,9 @@ pub mod holes;
 pub mod morphology;
 pub mod settle;
 pub mod state;
+pub mod valleys;
 
-pub use settle::{OversizePiece, Segment, Settled};
+pub use settle::{Evidence, OversizePiece, Segment, Settled};
 
 use crate::index::Scale;
 use crate::settings::{AreaRule, SegmentSettings};

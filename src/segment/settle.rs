@@ -35,13 +35,31 @@ pub struct Settled {
     pub unsettled: Vec<u32>,
 }
 
+/// What speaks for a grain, as far as the method tells; of vertices, areas in m².
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Evidence {
+    /// Mean of the least bending along the rim, in 1 over the mean edge length: how sharp its border is; far below 0 where
+    /// valleys surround it.
+    pub rim_bend: f64,
+    /// Share of the rim where it ends without meeting anything, 0 to 1.
+    pub free_rim: f64,
+    /// Mean curvature times the square root of the area: 2.5 for half a ball, 0 for a plane.
+    pub roundness: f64,
+    /// Share of the area that lies away from valleys, and was not only grown into.
+    pub core_share: f64,
+    /// Patches that were joined.
+    pub patches: u32,
+}
+
 /// The triangles of one grain.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Segment {
     /// Local triangle numbers, ascending.
     pub triangles: Vec<u32>,
     /// Whether an edge of the mesh (survey border, scan shadow) bounds it.
     pub at_mesh_edge: bool,
+    /// What speaks for it; none where the method does not tell.
+    pub evidence: Option<Evidence>,
 }
 
 /// The part of an oversize body that lies in a tile's core.
@@ -124,7 +142,8 @@ pub fn settle(mesh: &TileMesh, adjacency: &Adjacency, sizes: &Sizes, labels: &La
     let mut grains: Vec<Option<Segment>> = (0..bodies.count())
         .map(|part| {
             let publish = owned(part) && closed(part) && bodies.size[part] >= sizes.smallest;
-            let segment = |n| Segment { triangles: Vec::with_capacity(n), at_mesh_edge: at_mesh_edge[part] };
+            let segment =
+                |n| Segment { triangles: Vec::with_capacity(n), at_mesh_edge: at_mesh_edge[part], evidence: None };
             publish.then(|| segment(triangles[part]))
         })
         .collect();

@@ -125,6 +125,7 @@ impl Settings {
             s.dilation_iterations <= 1000,
             "must be at most 1000 rings",
         )?;
+        self.valleys.check()?;
         let surface = &self.surface;
         range(
             "surface.gap_spacings",
@@ -175,7 +176,12 @@ impl Settings {
     }
 }
 
-fn range(key: &'static str, value: impl ToString, ok: bool, rule: &'static str) -> Result<(), SettingsError> {
+pub(super) fn range(
+    key: &'static str,
+    value: impl ToString,
+    ok: bool,
+    rule: &'static str,
+) -> Result<(), SettingsError> {
     if ok { Ok(()) } else { Err(SettingsError::Range { key, value: value.to_string(), rule }) }
 }
 

@@ -4,6 +4,9 @@
 //! `configs/default.toml` is compared with [`Settings::default`] by a test.
 
 mod load;
+mod valleys;
+
+pub use valleys::ValleySettings;
 
 pub use load::{PRESETS, SettingsError, parse_bytes};
 
@@ -21,6 +24,8 @@ pub struct Settings {
     pub curvature: CurvatureSettings,
     /// What makes a grain.
     pub segment: SegmentSettings,
+    /// How the method `valleys` tells stones apart.
+    pub valleys: ValleySettings,
     /// When a measurement is flagged.
     pub measure: MeasureSettings,
     /// The grain-size raster.
@@ -99,6 +104,18 @@ impl Default for CurvatureSettings {
     }
 }
 
+/// How stones are told apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// Along valleys of the surface: keys of `[valleys]`.
+    #[default]
+    Valleys,
+    /// As published by Rheinwalt, Purinton & Bookhagen (2025): keys of `[curvature]` and the further ones of
+    /// `[segment]`.
+    Rheinwalt2025,
+}
+
 /// How the smallest grain is counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
@@ -125,6 +142,8 @@ pub enum ConcaveRule {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SegmentSettings {
+    /// How stones are told apart.
+    pub method: Method,
     /// Widest grain, metres (longer side of its box in plan); 0 for no limit. Wider bodies are reported
     /// as oversize, never as grains. Decides how far a tile must look beyond its core.
     pub max_grain_m: f64,
@@ -155,6 +174,7 @@ pub struct SegmentSettings {
 impl Default for SegmentSettings {
     fn default() -> Self {
         SegmentSettings {
+            method: Method::Valleys,
             max_grain_m: 2.0,
             min_grain_area_m2: 1e-4,
             min_grain_triangles: 50.0,
@@ -167,6 +187,24 @@ impl Default for SegmentSettings {
             dilation_iterations: 3,
             fill_holes: true,
             fill_edge_holes: false,
+        }
+    }
+}
+
+impl SegmentSettings {
+    /// How far the steps of the published method look beyond a body, mean edge lengths: a ring of triangles is up to
+    /// three edges wide.
+    pub fn reach_edges(&self) -> f64 {
+        3.0 * f64::from(self.erosion_iterations + self.dilation_iterations + 2)
+    }
+}
+
+impl Settings {
+    /// How far the steps of the method look beyond a body, mean edge lengths.
+    pub fn reach_edges(&self) -> f64 {
+        match self.segment.method {
+            Method::Valleys => self.valleys.reach_edges(),
+            Method::Rheinwalt2025 => self.segment.reach_edges(),
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::patch::Patch;
 use super::read::read_of;
 use super::runs::Runs;
-use crate::geometry::{DVec3, triangle_area};
+use crate::geometry::{DVec3, PlanBox, triangle_area};
 use crate::index::{CellBlock, Index, MOST_COUNTED};
 use crate::store::StoreError;
 
@@ -31,6 +31,8 @@ pub struct TileMesh {
     pub triangles: Vec<[u32; 3]>,
     /// Whether the triangle is owned.
     pub in_core: Vec<bool>,
+    /// The ground of which everything is loaded: all triangles whose centroid lies there. None where that is all ground.
+    pub seen: Option<PlanBox>,
     /// The survey's numbers of the vertices.
     pub vertex_runs: Runs,
     /// The survey's numbers of the triangles.
@@ -83,7 +85,8 @@ impl TileMesh {
             }
         }
         let Patch { vertices: vertex_runs, positions, triangles: triangle_runs, corners: triangles } = patch;
-        Ok(TileMesh { positions, complete, triangles, in_core, vertex_runs, triangle_runs })
+        let seen = (!everything).then(|| index.grid.plan(block));
+        Ok(TileMesh { positions, complete, triangles, in_core, seen, vertex_runs, triangle_runs })
     }
 
     /// The corners of a triangle, local metres.

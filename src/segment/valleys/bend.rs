@@ -1,0 +1,80 @@
+//! How the surface bends at each vertex, from the normals around it.
+
+use super::neighbours::Neighbours;
+use super::normals::Normals;
+use crate::geometry::DVec3;
+use glam::Vec3;
+use rayon::prelude::*;
+
+/// Bending at a vertex, as a share of 1 over the mean edge length; above 0 on a stone's top, below in a valley.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Bend {
+    /// The least normal curvature: across a valley.
+    pub least: f32,
+    /// Mean curvature.
+    pub mean: f32,
+}
+
+/// Bending at all vertices: the symmetric 2x2 matrix that best tells, in the tangent plane, the change of the normal
+/// along each edge from the edge (least squares over the ring; Rusinkiewicz 2004, doi:10.1109/TDPVT.2004.1335277, does
+/// it for triangles). 0 where edges determine none.
+pub fn bends(positions: &[DVec3], neighbours: &Neighbours, normals: &Normals, mean_edge_m: f64) -> Vec<Bend> {
+    let bend = |v: usize| {
+        let normal = normals.unit[v];
+        let [east, north] = tangents(normal);
+        let mut fit = Fit::default();
+        for &u in neighbours.around(v) {
+            let edge = (positions[u as usize] - positions[v]).as_vec3();
+            let change = normals.unit[u as usize] - normal;
+            fit.add([edge.dot(east), edge.dot(north)], [change.dot(east), change.dot(north)]);
+        }
+        let unit = mean_edge_m as f32;
+        fit.curvatures().map_or(Bend::default(), |[least, mean]| Bend { least: least * unit, mean: mean * unit })
+    };
+    (0..positions.len()).into_par_iter().with_min_len(1 << 12).map(bend).collect()
+}
+
+/// Two unit vectors across a normal and each other.
+fn tangents(normal: Vec3) -> [Vec3; 2] {
+    let aside = if normal.x.abs() < 0.7 { Vec3::X } else { Vec3::Y };
+    let east = normal.cross(aside).normalize_or_zero();
+    [east, normal.cross(east)]
+}
+
+/// Normal equations of a symmetric matrix that maps edges to changes of the normal.
+#[derive(Default)]
+struct Fit {
+    xx: f32,
+    xy: f32,
+    yy: f32,
+    by: [f32; 3],
+}
+
+impl Fit {
+    fn add(&mut self, [x, y]: [f32; 2], [change_x, change_y]: [f32; 2]) {
+        self.xx += x * x;
+        self.xy += x * y;
+        self.yy += y * y;
+        self.by[0] += x * change_x;
+        self.by[1] += y * change_x + x * change_y;
+        self.by[2] += y * change_y;
+    }
+
+    /// Least and mean curvature, 1/m; none where the edges lie in a line.
+    fn curvatures(&self) -> Option<[f32; 2]> {
+        let Fit { xx, xy, yy, by: [p, q, r] } = *self;
+        let both = xx + yy;
+        // Minors of [[xx, xy, 0], [xy, xx + yy, xy], [0, xy, yy]].
+        let [first, second] = [both * yy - xy * xy, xy * yy];
+        let determinant = xx * first - xy * second;
+        if determinant.is_nan() || determinant <= 1e-6 * both * both * both {
+            return None;
+        }
+        let a = (p * first - q * second + r * xy * xy) / determinant;
+        let b = (q * xx * yy - p * second - r * xx * xy) / determinant;
+        let c = (p * xy * xy - q * xx * xy + r * (xx * both - xy * xy)) / determinant;
+        let mean = 0.5 * (a + c);
+        let half = 0.5 * (a - c);
+        Some([mean - (half * half + b * b).sqrt(), mean])
+    }
+}

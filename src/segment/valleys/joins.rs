@@ -1,0 +1,215 @@
+//! Joins: cores that are parts of one stone, seen in several patches.
+//!
+//! Two patches of a convex body lie below each other's tangent planes, and nothing else reaches into the hull of both.
+//! They need not touch: what lies in front of a stone may part what is seen of it.
+
+use super::UNKNOWN;
+use super::cores::{GAP_EDGES, Ground};
+use super::judge::{Judged, Kind};
+use crate::geometry::{DVec3, ExactSum, PlanBox, Supports, mean_depth};
+use crate::segment::components::Forest;
+use crate::settings::ValleySettings;
+use rayon::prelude::*;
+
+/// What cores form grains.
+pub struct Joined {
+    /// The lowest core of the grain that each core belongs to, itself if it is joined to none.
+    pub root: Vec<u32>,
+    /// Whether all that could be joined to a core is known.
+    pub known: Vec<bool>,
+}
+
+/// Vertices of a core that are compared, at most.
+const SAMPLE: usize = 150;
+/// Of two cores, what lies no further beyond the gap than this, as a share of the square root of the smaller one's
+/// area, must agree by itself.
+const RIM: f64 = 0.3;
+/// What lies so far within the hull of two cores is inside, mean edge lengths.
+const INSIDE_EDGES: f64 = 1.5;
+
+/// Which cores are one. `cores` gives the core of each vertex, `seen` the ground of which every triangle with its centroid
+/// there is loaded.
+pub fn join(ground: &Ground, cores: &[u32], judged: &[Judged], seen: &PlanBox, settings: &ValleySettings) -> Joined {
+    let sure = Sure::of(ground, cores, seen);
+    let may = |core: usize| matches!(judged[core].kind, Kind::Stone | Kind::Sand | Kind::Open);
+    let patches: Vec<Patch> = judged.par_iter().map(|core| Patch::of(ground, core)).collect();
+    let farthest = |core: usize| reach_m(ground, judged[core].area_m2, settings);
+    let mut order: Vec<usize> = (0..judged.len()).filter(|&core| may(core)).collect();
+    order.sort_by(|&a, &b| judged[a].bounds.min[0].total_cmp(&judged[b].bounds.min[0]).then(a.cmp(&b)));
+    let widest_m = order.iter().map(|&core| farthest(core)).fold(0.0, f64::max);
+    let found: Vec<(usize, usize, Option<bool>)> = order
+        .par_iter()
+        .enumerate()
+        .flat_map_iter(|(place, &first)| {
+            let ahead = order[place + 1..]
+                .iter()
+                .take_while(move |&&other| judged[other].bounds.min[0] <= judged[first].bounds.max[0] + widest_m);
+            let (patches, sure, farthest) = (&patches, &sure, &farthest);
+            ahead.filter_map(move |&other| {
+                let (a, b) = (first.min(other), first.max(other));
+                // Of a core that is not whole the reach is not known, but it is not more than that of the other.
+                let open = |core: usize| judged[core].kind == Kind::Open;
+                let gap_m = match (open(a), open(b)) {
+                    (false, false) => farthest(a).min(farthest(b)),
+                    (true, false) => farthest(b),
+                    (false, true) => farthest(a),
+                    (true, true) => return None,
+                };
+                if apart(&judged[a].bounds, &judged[b].bounds) > gap_m {
+                    return None;
+                }
+                if open(a) || open(b) {
+                    return Some((a, b, None));
+                }
+                if [a, b].iter().all(|&core| judged[core].kind == Kind::Sand) {
+                    return None;
+                }
+                let pair = [(&judged[a], &patches[a]), (&judged[b], &patches[b])];
+                one(ground, (judged, [a, b]), pair, (gap_m, sure), settings).map(|one| (a, b, one))
+            })
+        })
+        .collect();
+    let mut parent: Vec<u32> = (0..judged.len() as u32).collect();
+    let mut forest = Forest { first: 0, parent: &mut parent };
+    // What is not in sight could be joined as well.
+    let in_sight = |core: usize| sure.holds(&grown(&judged[core].bounds, farthest(core)));
+    let mut known: Vec<bool> = (0..judged.len()).into_par_iter().map(|core| !may(core) || in_sight(core)).collect();
+    for (a, b, one) in found {
+        match one {
+            Some(true) => forest.join(a as u32, b as u32),
+            Some(false) => {}
+            None => (known[a], known[b]) = (false, false),
+        }
+    }
+    Joined { root: (0..judged.len() as u32).map(|core| forest.root(core)).collect(), known }
+}
+
+/// How far from a core of an area something may lie that is joined to it, m.
+fn reach_m(ground: &Ground, area_m2: f64, settings: &ValleySettings) -> f64 {
+    (settings.join_reach * area_m2.sqrt()).min(settings.join_reach_edges * ground.mean_edge_m)
+}
+
+fn apart(a: &PlanBox, b: &PlanBox) -> f64 {
+    let along = |i: usize| (a.min[i] - b.max[i]).max(b.min[i] - a.max[i]).max(0.0);
+    along(0).hypot(along(1))
+}
+
+fn grown(bounds: &PlanBox, by_m: f64) -> PlanBox {
+    PlanBox { min: bounds.min.map(|low| low - by_m), max: bounds.max.map(|high| high + by_m) }
+}
+
+/// A sample of a core: places and normals, in the order of the vertices.
+struct Patch {
+    points: Vec<DVec3>,
+    normals: Vec<DVec3>,
+}
+
+impl Patch {
+    fn of(ground: &Ground, core: &Judged) -> Patch {
+        let vertices = || core.vertices.iter().step_by(core.vertices.len().div_ceil(SAMPLE).max(1));
+        Patch {
+            points: vertices().map(|&v| ground.positions[v as usize]).collect(),
+            normals: vertices().map(|&v| ground.normals[v as usize].as_dvec3()).collect(),
+        }
+    }
+
+    /// How far each point lies from the nearest of another patch, m.
+    fn gaps_m(&self, other: &Patch) -> Vec<f64> {
+        let gap = |p: &DVec3| other.points.iter().map(|q| (*q - *p).length_squared()).fold(f64::INFINITY, f64::min);
+        self.points.iter().map(|p| gap(p).sqrt()).collect()
+    }
+
+    /// How steeply the points of another patch rise over the tangent planes of this one's points with a gap no wider, in
+    /// the mean: the sine; 0 for what lies below.
+    fn rise(&self, gaps_m: &[f64], widest_m: f64, other: &Patch) -> f64 {
+        let (mut sum, mut count) = (0.0, 0usize);
+        for ((p, normal), _) in self.points.iter().zip(&self.normals).zip(gaps_m).filter(|(_, gap)| **gap <= widest_m) {
+            for q in &other.points {
+                let way = *q - *p;
+                sum += (way.dot(*normal) / way.length().max(f64::MIN_POSITIVE)).max(0.0);
+            }
+            count += other.points.len();
+        }
+        sum / count.max(1) as f64
+    }
+}
+
+/// Whether two whole cores are one; none where they are too far apart, nothing where that hangs on what is not in sight.
+#[allow(clippy::type_complexity, reason = "each is named where it is used")]
+fn one(
+    ground: &Ground,
+    (judged, names): (&[Judged], [usize; 2]),
+    [(first, a), (second, b)]: [(&Judged, &Patch); 2],
+    (farthest_m, sure): (f64, &Sure),
+    settings: &ValleySettings,
+) -> Option<Option<bool>> {
+    let gaps_m = [a.gaps_m(b), b.gaps_m(a)];
+    let gap_m = gaps_m[0].iter().copied().fold(f64::INFINITY, f64::min);
+    if gap_m > farthest_m {
+        return None;
+    }
+    let smaller_m2 = first.area_m2.min(second.area_m2);
+    let rim_m = gap_m + RIM * smaller_m2.sqrt();
+    for widest_m in [f64::INFINITY, rim_m] {
+        let rise = a.rise(&gaps_m[0], widest_m, b).max(b.rise(&gaps_m[1], widest_m, a));
+        if rise >= settings.join_rise {
+            return Some(Some(false));
+        }
+    }
+    let both: Vec<DVec3> = a.points.iter().chain(&b.points).copied().collect();
+    let side_m = (first.area_m2 + second.area_m2).sqrt();
+    if mean_depth(&both, &both) >= settings.join_hollow * side_m {
+        return Some(Some(false));
+    }
+    let mut bounds = first.bounds;
+    bounds.merge(&second.bounds);
+    if !sure.holds(&bounds) {
+        return Some(None);
+    }
+    let hull = Supports::of(&both);
+    let mut swallowed = ExactSum::ZERO;
+    let beside = |(name, other): &(usize, &Judged)| !names.contains(name) && apart(&other.bounds, &bounds) == 0.0;
+    for v in judged.iter().enumerate().filter(beside).flat_map(|(_, other)| &other.vertices).map(|&v| v as usize) {
+        let p = ground.positions[v];
+        if bounds.margin_m(p) >= 0.0 && hull.depth(p) > INSIDE_EDGES * ground.mean_edge_m {
+            swallowed.add(f64::from(ground.area_m2[v]));
+        }
+    }
+    Some(Some(swallowed.value() < settings.join_swallowed * smaller_m2))
+}
+
+/// Where everything is known.
+struct Sure {
+    /// All cores that are not loaded lie outside.
+    inside: PlanBox,
+    /// Side of the squares, m.
+    square_m: f64,
+    /// Squares that hold unknown vertices, ascending.
+    unknown: Vec<[i64; 2]>,
+}
+
+impl Sure {
+    fn of(ground: &Ground, cores: &[u32], seen: &PlanBox) -> Sure {
+        let square_m = 16.0 * ground.mean_edge_m;
+        let mut unknown: Vec<[i64; 2]> = Vec::new();
+        if ground.unknown.is_some() {
+            let square =
+                |v: usize| [ground.positions[v].x, ground.positions[v].y].map(|x| (x / square_m).floor() as i64);
+            unknown = (0..cores.len()).filter(|&v| cores[v] == UNKNOWN).map(square).collect();
+            unknown.sort_unstable();
+            unknown.dedup();
+        }
+        Sure { inside: grown(seen, -GAP_EDGES * ground.mean_edge_m), square_m, unknown }
+    }
+
+    /// Whether everything in a box is known.
+    fn holds(&self, bounds: &PlanBox) -> bool {
+        let within = (0..2).all(|i| bounds.min[i] >= self.inside.min[i] && bounds.max[i] <= self.inside.max[i]);
+        let [low, high] = [bounds.min, bounds.max].map(|corner| corner.map(|x| (x / self.square_m).floor() as i64));
+        within
+            && (low[0]..=high[0]).all(|column| {
+                let from = self.unknown.partition_point(|square| *square < [column, low[1]]);
+                self.unknown.get(from).is_none_or(|square| *square > [column, high[1]])
+            })
+    }
+}

@@ -1,0 +1,56 @@
+//! Normals of the vertices, smoothed along the surface but not across creases.
+
+use super::neighbours::Neighbours;
+use crate::geometry::triangle_area;
+use crate::segment::bands::Bands;
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+/// Normals and areas of the vertices of a tile.
+pub struct Normals {
+    /// Unit normals by the right-hand rule; zero where none is.
+    pub unit: Vec<Vec3>,
+    /// A third of the triangles around each vertex, m².
+    pub area_m2: Vec<f32>,
+}
+
+impl Normals {
+    /// Area-weighted normals of the vertices. Sums run by ascending triangle.
+    pub fn of(bands: &Bands) -> Normals {
+        let mesh = bands.mesh;
+        let mut sums = vec![(DVec3::ZERO, 0.0f64); mesh.positions.len()];
+        let of = |t: usize| {
+            let [a, b, c] = mesh.corners(t as u32);
+            Some(((b - a).cross(c - a), triangle_area([a, b, c])))
+        };
+        bands.mark(&mut sums, of, |sum, (normal, area)| {
+            sum.0 += normal;
+            sum.1 += area / 3.0;
+        });
+        let unit = sums.par_iter().map(|(normal, _)| normal.normalize_or_zero().as_vec3()).collect();
+        Normals { unit, area_m2: sums.par_iter().map(|(_, area)| *area as f32).collect() }
+    }
+
+    /// Takes the mean over each vertex and its neighbours, so many times, weighted by area and by how alike the
+    /// normals are: those that differ by `crease` (length of the difference of unit normals) weigh a quarter.
+    ///
+    /// What a vertex gets depends on as many rings of neighbours as there are passes.
+    pub fn smooth(&mut self, neighbours: &Neighbours, passes: u32, crease: f32) {
+        let sharpness = 1.0 / (crease * crease);
+        let mut next = vec![Vec3::ZERO; self.unit.len()];
+        for _ in 0..passes {
+            let (unit, area) = (&self.unit, &self.area_m2);
+            next.par_iter_mut().enumerate().with_min_len(1 << 12).for_each(|(v, next)| {
+                let own = unit[v];
+                let mut sum = own * area[v];
+                for &u in neighbours.around(v) {
+                    let other = unit[u as usize];
+                    let unlike = 1.0 + (other - own).length_squared() * sharpness;
+                    sum += other * (area[u as usize] / (unlike * unlike));
+                }
+                *next = sum.normalize_or_zero();
+            });
+            std::mem::swap(&mut self.unit, &mut next);
+        }
+    }
+}
