@@ -13,6 +13,7 @@ use crate::statistics::RasterError;
 use crate::stitch::RecordError;
 use crate::store::StoreError;
 use crate::triangulate::DrapeError;
+use crate::validate::ValidateError;
 use crate::weld::WeldError;
 use crate::write::WriteError;
 
@@ -47,6 +48,9 @@ pub enum Error {
     /// The sample scene cannot be written.
     #[error(transparent)]
     Demo(#[from] DemoError),
+    /// The run cannot be held against known stones.
+    #[error(transparent)]
+    Validate(Box<ValidateError>),
     /// Somebody pressed Ctrl-C.
     #[error(transparent)]
     Interrupted(#[from] Interrupted),
@@ -106,6 +110,12 @@ pub enum ExitCode {
     DoneWithLosses = 3,
     /// Ctrl-C or a termination signal.
     Interrupted = 130,
+}
+
+impl From<ValidateError> for Error {
+    fn from(error: ValidateError) -> Error {
+        Error::Validate(Box::new(error))
+    }
 }
 
 impl<E: Into<Error>> From<Stopped<E>> for Error {

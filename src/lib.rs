@@ -53,6 +53,8 @@ pub mod forecast;
 pub mod inspect;
 pub mod opening;
 pub mod passes;
+pub mod picture;
 pub mod resume;
 pub mod run;
 pub mod surfaces;
+pub mod validate;

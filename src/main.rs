@@ -1,7 +1,7 @@
 //! The program: parse, run, say what went wrong, exit.
 
 use clap::Parser;
-use gravelometer::cli::{Cli, Command, DemoArgs, InspectArgs, Log, RunArgs, SettingArgs};
+use gravelometer::cli::{Cli, Command, DemoArgs, InspectArgs, Log, RunArgs, SettingArgs, ValidateArgs};
 use gravelometer::cli::{cost_table, report_error, reporter};
 use gravelometer::demo::{Demonstration, demonstrate};
 use gravelometer::error::{Error, ExitCode};
@@ -9,6 +9,7 @@ use gravelometer::pipeline::{Cancelled, Control, Interrupted, share_one_heap};
 use gravelometer::progress::Progress;
 use gravelometer::run::{Job, is_done, run};
 use gravelometer::settings::InputSettings;
+use gravelometer::validate::{Shown, Validated, validate};
 use std::io::Write;
 use std::time::Duration;
 
@@ -18,6 +19,7 @@ fn main() -> std::process::ExitCode {
         Command::Run(args) => (args.log, run_command(&args)),
         Command::Inspect(args) => (Log::Text, inspect_command(&args)),
         Command::Demo(args) => (args.log, demo_command(&args)),
+        Command::Validate(args) => (Log::Text, validate_command(&args)),
         Command::Settings(args) => (Log::Text, settings_command(&args)),
     };
     let code = result.unwrap_or_else(|error| {
@@ -122,6 +124,20 @@ fn demo_command(args: &DemoArgs) -> Result<ExitCode, Error> {
     }
     print("Look at grains.png (true stones outlined in black), or open grains.gpkg in QGIS.");
     Ok(if shown.outcome.lost.is_empty() { ExitCode::Done } else { ExitCode::DoneWithLosses })
+}
+
+fn validate_command(args: &ValidateArgs) -> Result<ExitCode, Error> {
+    let Validated { report, files, picture } = validate(&args.validation())?;
+    print(&report.to_string());
+    if !files.is_empty() {
+        print("");
+    }
+    files.iter().for_each(|file| print(&file.display().to_string()));
+    if picture.is_some() {
+        let colors = Shown::ALL.map(Shown::legend).map(|(color, meaning)| format!("  {color:<13} {meaning}\n"));
+        print(&format!("Colours of the picture, with the true stones outlined in black:\n{}", colors.concat()));
+    }
+    Ok(ExitCode::Done)
 }
 
 /// A text on standard output. That nobody reads it (`| head`) is no failure; a full disk is.

@@ -10,44 +10,25 @@ mod support;
 use gravelometer::curvature::{InstructionSet, Stencil};
 use gravelometer::geometry::DVec3;
 use gravelometer::index::{BuildRoom, CellBlock, Index};
-use gravelometer::measure::Wanted;
 use gravelometer::open::MemorySurface;
-use gravelometer::passes::{CoreValues, Recipe, Survey};
-use gravelometer::pipeline::{Budget, Control, Crew};
+use gravelometer::passes::{CoreValues, Recipe, Survey, Telling};
 use gravelometer::progress::Silent;
 use gravelometer::segment::state::State;
 use gravelometer::segment::{Settled, segment};
 use gravelometer::settings::{AreaRule, ConcaveRule, CurvatureSettings, SegmentSettings};
-use gravelometer::stitch::{Catalogue, TileReport, stitch};
+use gravelometer::stitch::{Catalogue, TileReport};
 use gravelometer::store::{Column, Shelf};
 use gravelometer::tile::{CoreSize, Owned, Plan, TileMesh, read_of};
-use std::convert::Infallible;
 use support::bed::{Rng, bed, shuffled};
+use support::tiled::{self, ONE_TILE, Tiling, WANTED, assert_same, crew};
 
-const WANTED: Wanted = Wanted { outline_step_m: 1.0 / 1_048_576.0, triangle_ids: true };
-
-#[derive(Debug, Clone, Copy)]
-struct Tiling {
-    tile_size_m: f64,
-    threads: usize,
-    memory_bytes: u64,
-}
-
-const ONE_TILE: Tiling = Tiling { tile_size_m: 1e9, threads: 3, memory_bytes: 1 << 30 };
-
-struct Worked<'a> {
-    surface: &'a MemorySurface,
+struct Worked {
     index: Index,
     divergence: Column<f64>,
 }
 
-fn crew(tiling: Tiling) -> Crew {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(tiling.threads).build().unwrap();
-    Crew { pool, budget: Budget::new(tiling.memory_bytes), control: Control::default() }
-}
-
 /// Spacing and divergence, tiled, from an index that was built in little memory.
-fn worked(surface: &MemorySurface, tiling: Tiling) -> Worked<'_> {
+fn worked(surface: &MemorySurface, tiling: Tiling) -> Worked {
     let crew = crew(tiling);
     let room = BuildRoom { bytes: tiling.memory_bytes, wide: tiling.threads > 1 };
     let mut index = crew.pool.install(|| support::indexed_with(surface, room));
@@ -69,7 +50,7 @@ fn worked(surface: &MemorySurface, tiling: Tiling) -> Worked<'_> {
     };
     let lost = survey.divergence(&crew, &jobs, &stencil, &Silent, keep).unwrap();
     assert!(lost.is_empty(), "{lost:?}");
-    Worked { surface, index, divergence }
+    Worked { index, divergence }
 }
 
 fn values(column: &Column<f64>) -> Vec<f64> {
@@ -79,42 +60,8 @@ fn values(column: &Column<f64>) -> Vec<f64> {
 }
 
 fn catalogue(worked: &Worked, settings: &SegmentSettings, tiling: Tiling) -> (Catalogue, Vec<TileReport>) {
-    let plan = Plan::new(&worked.index, CoreSize::square(&worked.index, tiling.tile_size_m));
-    let survey = Survey { index: &worked.index, plan: &plan, instructions: InstructionSet::best() };
-    let recipe = Recipe { settings, divergence: &worked.divergence, wanted: WANTED, usual_width_m: None };
-    let jobs: Vec<usize> = (0..plan.tiles.len()).collect();
-    let mut findings = Vec::new();
-    let collect = |_, finding| {
-        findings.push(finding);
-        Ok::<_, Infallible>(())
-    };
-    let lost = survey.grains(&crew(tiling), &jobs, &recipe, &Silent, collect).unwrap();
-    assert!(lost.is_empty(), "{tiling:?}: {lost:?}");
-    let touch_steps = (4.0 * worked.index.scale.mean_edge_m / WANTED.outline_step_m) as i64;
-    let (catalogue, tiles) = stitch(findings, touch_steps);
-    every_triangle_has_one_owner(worked, &catalogue, &tiles);
-    (catalogue, tiles)
-}
-
-fn every_triangle_has_one_owner(worked: &Worked, catalogue: &Catalogue, tiles: &[TileReport]) {
-    assert_eq!(tiles.iter().map(|t| t.core_triangles).sum::<u64>(), worked.index.scale.triangles);
-    assert_eq!(tiles.iter().map(|t| t.grains).sum::<u64>(), catalogue.grains.len() as u64);
-    let mut owner = vec![0u64; worked.surface.triangles.len()];
-    for (i, g) in catalogue.grains.iter().enumerate() {
-        assert_eq!((g.grain_id, g.grain.triangles), (i as u64 + 1, g.grain.triangle_ids.len() as u64));
-        for &t in &g.grain.triangle_ids {
-            assert_eq!(owner[t as usize], 0, "triangle {t} is in two grains");
-            owner[t as usize] = g.grain_id;
-        }
-    }
-}
-
-fn assert_same(expected: &Catalogue, found: &Catalogue, what: &str) {
-    assert_eq!(expected.grains.len(), found.grains.len(), "number of grains, {what}");
-    for (e, f) in expected.grains.iter().zip(&found.grains) {
-        assert!(e == f && format!("{e:?}") == format!("{f:?}"), "{what}:\n{e:?}\n{f:?}");
-    }
-    assert_eq!(format!("{:?}", expected.oversize), format!("{:?}", found.oversize), "{what}");
+    let method = Telling::Rheinwalt2025(&worked.divergence);
+    tiled::catalogue(&worked.index, &Recipe { settings, method, wanted: WANTED, usual_width_m: None }, tiling)
 }
 
 fn settings(change: impl FnOnce(&mut SegmentSettings)) -> SegmentSettings {

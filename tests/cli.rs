@@ -68,7 +68,7 @@ fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 fn help_names_every_command_and_the_exit_codes() {
     let said = gravelometer(["--help"]);
     assert_eq!((said.code, said.err.as_str()), (0, ""));
-    for text in ["run", "inspect", "demo", "settings", "Exit codes", "130"] {
+    for text in ["run", "inspect", "demo", "validate", "settings", "Exit codes", "130"] {
         assert!(said.out.contains(text), "{text}: {}", said.out);
     }
 }

@@ -23,6 +23,9 @@ const SHARED: [&str; 2] = ["geometry", "settings"];
 const MACHINERY: [&str; 3] = ["pipeline", "progress", "store"];
 /// Stages that touch the disk through `store`.
 const KEEPS: [&str; 4] = ["triangulate", "index", "tile", "write"];
+/// What stands beside the river and must not know how grains are found and measured, with all that it may use.
+const BESIDE: [(&str, &[&str]); 2] =
+    [("picture", &["geometry"]), ("validate", &["geometry", "settings", "open", "statistics", "store", "picture"])];
 const MOST_LINES: usize = 400;
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
@@ -76,6 +79,19 @@ fn no_stage_uses_one_below_it() {
             assert!(allowed, "{} uses crate::{other}", path.display());
         }
     }
+}
+
+#[test]
+fn what_judges_a_run_does_not_use_what_made_it() {
+    let mut judged = 0;
+    for (module, path, named) in uses() {
+        let Some((_, allowed)) = BESIDE.iter().find(|(name, _)| *name == module) else { continue };
+        judged += 1;
+        for other in named.iter().filter(|other| **other != module) {
+            assert!(allowed.contains(&other.as_str()), "{} uses crate::{other}", path.display());
+        }
+    }
+    assert!(judged > 10, "found only {judged} files");
 }
 
 #[test]

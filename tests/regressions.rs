@@ -9,6 +9,8 @@ mod offsets;
 mod ply;
 #[path = "fuzz/checks/settings.rs"]
 mod settings;
+#[path = "fuzz/checks/truth.rs"]
+mod truth;
 
 use std::path::Path;
 
@@ -49,10 +51,15 @@ fn every_input_kept_for_settings_is_read_or_refused_by_name() {
 }
 
 #[test]
+fn every_input_kept_for_truth_is_read_or_refused_by_name() {
+    run_all("truth", truth::check);
+}
+
+#[test]
 fn every_target_is_run_here() {
     let targets = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz/fuzz_targets");
     let mut names: Vec<_> =
         targets.read_dir().expect("a folder").map(|entry| entry.expect("an entry").file_name()).collect();
     names.sort();
-    assert_eq!(names, ["las.rs", "offsets.rs", "ply.rs", "settings.rs"], "a target without its test above");
+    assert_eq!(names, ["las.rs", "offsets.rs", "ply.rs", "settings.rs", "truth.rs"], "a target without its test above");
 }

@@ -2,9 +2,11 @@
 
 mod cost_table;
 mod report;
+mod validate_args;
 
 pub use cost_table::cost_table;
 pub use report::{report_error, reporter};
+pub use validate_args::ValidateArgs;
 
 use crate::settings::{Settings, SettingsError, Unit};
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -60,6 +62,9 @@ pub enum Command {
     Inspect(InspectArgs),
     /// Make a sample scene with known pebbles, run on it, and say how many were found
     Demo(DemoArgs),
+    /// Score a run against known stones: which were found, how well they are sized and laid
+    #[command(after_long_help = validate_args::teaching())]
+    Validate(ValidateArgs),
     /// Print the settings that a run would use, as a settings file
     Settings(SettingArgs),
 }

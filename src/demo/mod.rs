@@ -3,7 +3,7 @@
 //! A patch of gravel bar is built from a seed: stones dropped on rippled sand, seen from above as a
 //! photogrammetric survey sees it (overhanging flanks down to the view limit, nothing beyond), smoothed
 //! and noisy as such a surface is. Every triangle knows its true stone, so that a run can be scored the
-//! way the field's paper does (Rheinwalt et al. 2025): [`make_scene`], segment, [`score`].
+//! way the field's paper does (Rheinwalt et al. 2025): [`make_scene`], segment, [`score()`].
 //!
 //! ```text
 //!  placement ──> bed (implicit stones and sand) ──> voxels ──> surface ──> sight ──> finish ──> Scene
@@ -15,7 +15,6 @@
 mod bed;
 mod color;
 mod finish;
-mod picture;
 mod placement;
 mod ply;
 mod random;
@@ -29,9 +28,10 @@ mod stone;
 mod surface;
 mod voxels;
 
-pub use picture::{Picture, PictureError, top_view, write_png};
+pub use crate::picture::{Picture, PictureError, top_view, write_png};
+pub use crate::validate::Detection;
 pub use ply::{write_ply, write_truth_csv};
 pub use scene::{Scene, Stone, make_scene};
-pub use score::{Detection, MIN_GRAIN_AREA_M2, Score, VISIBLE_AREA_FACTOR, score};
+pub use score::{MIN_GRAIN_AREA_M2, Score, VISIBLE_AREA_FACTOR, score};
 pub use settings::{SAND, SceneSettings};
 pub use show::{DemoError, Demonstration, Shown, demonstrate};

@@ -4,6 +4,7 @@
 //! every record, in parallel. Anything else is walked once, record by record, and tabulated.
 
 use super::error::OpenError;
+use super::face_label::FaceLabel;
 use super::ply_header::{Element, Kind};
 use super::progress::Progress;
 use super::records::{CHUNK, Source, Walk};
@@ -28,6 +29,8 @@ pub(super) struct Faces {
     length: Scalar,
     index: Scalar,
     shape: Shape,
+    /// Where a face says to which instance it belongs.
+    pub(super) label: Option<FaceLabel>,
 }
 
 #[derive(Debug)]
@@ -58,7 +61,7 @@ impl Faces {
     /// Those of a point cloud.
     pub(super) fn none() -> Faces {
         let shape = Shape::Fixed { first_list: 0, stride: 0 };
-        Faces { count: 0, triangles: 0, length: Scalar::U8, index: Scalar::U32, shape }
+        Faces { count: 0, triangles: 0, length: Scalar::U8, index: Scalar::U32, shape, label: None }
     }
 
     /// Finds and validates the faces, whose element starts at byte `start`, and the byte behind them.
@@ -73,10 +76,21 @@ impl Faces {
         progress: &Progress<'_>,
     ) -> Result<(Faces, u64), OpenError> {
         let corners = find_corners(source.path, element)?;
-        if let Some(found) = read_fixed(source, element, start, (corners, vertices), progress)? {
-            return Ok(found);
-        }
-        read_walking(source, element, start, (corners, vertices), progress)
+        let (mut faces, end) = match read_fixed(source, element, start, (corners, vertices), progress)? {
+            Some(found) => found,
+            None => read_walking(source, element, start, (corners, vertices), progress)?,
+        };
+        faces.label = FaceLabel::find(element, corners.property);
+        Ok((faces, end))
+    }
+
+    /// The number that says to which instance a face belongs, if the file has one.
+    #[inline]
+    pub(super) fn label_of(&self, bytes: &[u8], face: u64) -> Option<f64> {
+        let label = self.label.as_ref()?;
+        let list = self.list_at(face);
+        let list_bytes = self.length.size() + self.length.integer(&bytes[list..]) as usize * self.index.size();
+        Some(label.number(bytes, list, list_bytes))
     }
 
     /// Byte at which the list of a face starts.
@@ -202,6 +216,7 @@ fn read_fixed(
         length,
         index,
         shape: Shape::Fixed { first_list, stride },
+        label: None,
     };
     let look = |face: u64| {
         let list = &source.bytes[(first_list + face * stride) as usize..];
@@ -278,7 +293,7 @@ fn read_walking(
         let face_of = faces_of_triangles(source.path, &first_triangle, triangles)?;
         Shape::Polygons { list_at, first_triangle, face_of }
     };
-    Ok((Faces { count: element.count, triangles, length, index, shape }, at))
+    Ok((Faces { count: element.count, triangles, length, index, shape, label: None }, at))
 }
 
 /// Refuses a list of corners, at this byte, that makes no polygon.

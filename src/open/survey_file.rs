@@ -167,6 +167,21 @@ impl SurveyFile {
         self.mesh.vertices.record(self.mesh.bytes(), vertex)
     }
 
+    /// Name and type of the number that says to which instance (grain, segment) a face belongs, one of
+    /// [`super::LABEL_NAMES`].
+    pub fn face_label(&self) -> Option<(&'static str, Scalar)> {
+        self.mesh.faces.label.as_ref().map(|label| (label.name, label.scalar))
+    }
+
+    /// That number of a face of this file.
+    ///
+    /// # Panics
+    /// Above the file's last face.
+    #[inline]
+    pub fn face_label_of(&self, face: u64) -> Option<f64> {
+        self.mesh.faces.label_of(self.mesh.bytes(), face)
+    }
+
     /// The corners of a face as the file has them: vertices of this file.
     ///
     /// # Panics

@@ -7,6 +7,7 @@
 //! one kind of file.
 
 use super::error::OpenError;
+use super::face_label::may_be_label;
 use super::faces::{Corners, STRIPS, check_corners, find_corners};
 use super::mapped::MappedFile;
 use super::numbers::{BigEndian, LittleEndian, Numbers, Text};
@@ -217,7 +218,8 @@ impl Job<'_> {
         Ok(Element { name: element.name.clone(), count: element.count, properties })
     }
 
-    /// The corners of each face, or of each triangle of each strip; everything else is left out.
+    /// The corners of each face, with the numbers that may be its label, or of each triangle of each strip; everything
+    /// else is left out.
     fn corners(
         &self,
         element: &Element,
@@ -225,13 +227,22 @@ impl Job<'_> {
         to: &mut impl Write,
     ) -> Result<Element, OpenError> {
         let Corners { property: place, length, index: entry } = find_corners(self.source.path, element)?;
+        let is_kept = |property: &Property| element.name != STRIPS && may_be_label(property);
         let mut faces = 0;
         self.each_record(element, numbers, |index, numbers| {
             for (i, property) in element.properties.iter().enumerate() {
                 let at = Place { element, index, property };
-                if i != place {
-                    self.skip(at, numbers)?;
-                    continue;
+                match property.kind {
+                    Kind::Number(scalar) if is_kept(property) => {
+                        let label = self.next(at, scalar, numbers)?;
+                        label.write(scalar, to).map_err(|e| self.unwritten(e))?;
+                        continue;
+                    }
+                    _ if i != place => {
+                        self.skip(at, numbers)?;
+                        continue;
+                    }
+                    _ => {}
                 }
                 let (corners, byte) = self.entries(at, length, numbers)?;
                 faces += if element.name == STRIPS {
@@ -243,9 +254,11 @@ impl Job<'_> {
             }
             Ok(())
         })?;
-        let name = element.properties[place].name.clone();
-        let kind = Kind::List { length: Scalar::U32, entry };
-        Ok(Element { name: "face".to_owned(), count: faces, properties: vec![Property { name, kind }] })
+        let mut properties = element.properties.clone();
+        properties[place].kind = Kind::List { length: Scalar::U32, entry };
+        let kept = |(i, property): (usize, Property)| (i == place || is_kept(&property)).then_some(property);
+        let properties = properties.into_iter().enumerate().filter_map(kept).collect();
+        Ok(Element { name: "face".to_owned(), count: faces, properties })
     }
 
     fn face(

@@ -4,6 +4,7 @@
 pub mod bed;
 pub mod interrupted;
 pub mod small_disk;
+pub mod tiled;
 
 use gravelometer::index::{BuildRoom, Index};
 use gravelometer::open::Surface;

@@ -33,6 +33,7 @@ pub(crate) fn check(bytes: &[u8]) {
     let (mut corners, mut next) = (Vec::new(), 0);
     reach.corner_numbers(0..reach.triangles(), &mut corners);
     for face in 0..reach.faces() {
+        assert_eq!(of_file.face_label_of(face).is_some(), of_file.face_label().is_some());
         let of_face: Vec<u64> = of_file.face_corners(face).collect();
         for pair in of_face[1..].windows(2) {
             let triangle = [of_face[0], pair[0], pair[1]];

@@ -1,0 +1,148 @@
+//! The promise of the program for the method `valleys`: a grain is the same, bit for bit, whatever the tiles, the threads
+//! and the memory. As `certainty.rs` does for the published method.
+#![allow(missing_docs, clippy::unwrap_used, unreachable_pub)]
+
+mod support;
+
+use gravelometer::index::{BuildRoom, CellBlock, Index};
+use gravelometer::open::MemorySurface;
+use gravelometer::passes::{Recipe, Telling};
+use gravelometer::segment::valleys::segment_along_valleys;
+use gravelometer::settings::{SegmentSettings, ValleySettings};
+use gravelometer::stitch::{Catalogue, TileReport};
+use gravelometer::tile::{CoreSize, Owned, Plan, TileMesh};
+use support::bed::{Rng, bed, shuffled};
+use support::tiled::{self, ONE_TILE, Tiling, WANTED, assert_same};
+
+type How = (&'static str, SegmentSettings, ValleySettings);
+
+fn how(name: &'static str, change: impl FnOnce(&mut SegmentSettings, &mut ValleySettings)) -> How {
+    let mut segment = SegmentSettings {
+        max_grain_m: 1.05,
+        min_grain_area_m2: 0.004,
+        min_grain_triangles: 12.0,
+        ..SegmentSettings::default()
+    };
+    // The edges of this bed are a tenth of a stone, so that the default reaches would span most of it.
+    let mut valleys = ValleySettings {
+        normal_passes: 2,
+        growth_edges: 4.0,
+        refill_edges: 2.5,
+        join_reach_edges: 6.0,
+        sand_delay_edges: 1.5,
+        ..ValleySettings::default()
+    };
+    change(&mut segment, &mut valleys);
+    (name, segment, valleys)
+}
+
+fn all_hows() -> Vec<How> {
+    vec![
+        how("shorter reaches", |_, _| {}),
+        how("default reaches", |_, v| *v = ValleySettings::default()),
+        how("nothing smoothed, no bridges cut", |_, v| (v.normal_passes, v.bridge_edges) = (0, 0.0)),
+        how("many joins", |_, v| (v.join_rise, v.join_hollow, v.join_swallowed) = (0.3, 0.3, 2.0)),
+        how("no joins, no growth", |_, v| (v.join_reach, v.growth_edges) = (0.0, 0.0)),
+        how("everything is a stone", |_, v| v.stone_score = -10.0),
+        how("most is sand", |_, v| v.stone_score = 1.4),
+        how("narrow grains", |s, _| s.max_grain_m = 0.3),
+        how("no limit", |s, _| s.max_grain_m = 0.0),
+        how("tiny seeds, plain smoothing", |s, v| {
+            (s.min_grain_area_m2, v.seed_share, v.crease, v.valley_depth) = (0.002, 0.1, 10.0, 0.03);
+        }),
+    ]
+}
+
+fn catalogue(index: &Index, (_, settings, valleys): &How, tiling: Tiling) -> (Catalogue, Vec<TileReport>) {
+    let recipe = Recipe { settings, method: Telling::Valleys(valleys), wanted: WANTED, usual_width_m: None };
+    tiled::catalogue(index, &recipe, tiling)
+}
+
+fn indexed(surface: &MemorySurface, tiling: Tiling) -> Index {
+    let room = BuildRoom { bytes: tiling.memory_bytes, wide: tiling.threads > 1 };
+    tiled::crew(tiling).pool.install(|| support::indexed_with(surface, room))
+}
+
+#[test]
+fn every_setting_gives_the_same_catalogue_bit_for_bit_whatever_the_tiles_threads_and_memory() {
+    let mut rng = Rng(17);
+    let (mut grains, mut joined, mut attempts, mut tiles, mut wide) = (0, 0, 0, 0, 0);
+    for (surface, random_tilings) in [(shuffled(&bed(1, 150, 120), 5), 3), (bed(2, 130, 100), 1)] {
+        let reference = indexed(&surface, ONE_TILE);
+        let expected: Vec<Catalogue> = all_hows().iter().map(|how| catalogue(&reference, how, ONE_TILE).0).collect();
+        let mut tilings = vec![Tiling { tile_size_m: 0.25, threads: 3, memory_bytes: 1 }];
+        for i in 0..random_tilings {
+            let (threads, memory_bytes) = [(1, 1 << 30), (3, 1)][i % 2];
+            tilings.push(Tiling { tile_size_m: rng.within(0.5, 1.6), threads, memory_bytes });
+        }
+        for (k, &tiling) in tilings.iter().enumerate() {
+            let index = indexed(&surface, tiling);
+            let core_m = Plan::new(&index, CoreSize::square(&index, tiling.tile_size_m)).core_m(&index)[0];
+            for (r, how) in all_hows().iter().enumerate() {
+                // The finest tiling is dear, most so without a limit: it takes every third setting.
+                if k == 0 && (how.1.max_grain_m == 0.0 || (r + random_tilings) % 3 != 0) {
+                    continue;
+                }
+                let (found, reports) = catalogue(&index, how, tiling);
+                assert_same(&expected[r], &found, &format!("{}, {tiling:?}, {} tiles", how.0, reports.len()));
+                grains += found.grains.len();
+                attempts = attempts.max(reports.iter().map(|t| t.attempts).max().unwrap());
+                tiles = tiles.max(reports.len());
+                let pieces = |g: &&gravelometer::stitch::NumberedGrain| g.grain.outline.len() > 1;
+                joined += found.grains.iter().filter(pieces).count();
+                wide += found.grains.iter().filter(|g| g.grain.axes_m[0] > core_m).count();
+            }
+        }
+    }
+    println!("{grains} grains, {joined} in pieces, {wide} wider than a core; {attempts} attempts, {tiles} tiles");
+    assert!(grains > 1000 && joined > 20 && wide > 10, "{grains} grains, {joined} in pieces, {wide} wide");
+    assert!(attempts > 1 && tiles > 60, "{attempts} attempts, {tiles} tiles");
+}
+
+/// Halos as thin as they come: most of a tile is unknown, and the little that it claims to know must be so. Every grain of
+/// the core is either found, or its lowest triangle is named as unsettled.
+#[test]
+fn what_a_tile_with_a_thin_halo_publishes_is_true_and_what_it_does_not_is_named() {
+    let index = indexed(&shuffled(&bed(6, 150, 120), 9), ONE_TILE);
+    let grid = &index.grid;
+    let mut rng = Rng(41);
+    let (mut settled, mut owned, mut early, mut later_on) = (0, 0, 0, 0);
+    for (name, segment, valleys) in all_hows() {
+        let grains = |mesh: &TileMesh| {
+            let found = segment_along_valleys(mesh, &index.scale, &segment, &valleys);
+            let ids = |t: &u32| mesh.triangle_id(*t);
+            let grains: Vec<(Vec<u64>, _)> =
+                found.grains.iter().map(|g| (g.triangles.iter().map(ids).collect(), g.evidence)).collect();
+            (grains, found.unsettled)
+        };
+        let (truth, open) = grains(&TileMesh::load(&index, Owned::Cells(&grid.all()), &grid.all()).unwrap());
+        assert!(open.is_empty(), "{name}: {} triangles are unknown though all are loaded", open.len());
+        for _ in 0..90 {
+            let mut side = |n: u32| {
+                let first = rng.below(n as usize) as u32;
+                first..(first + 2 + 2 * rng.below(3) as u32).min(n)
+            };
+            let core = CellBlock { columns: side(grid.columns), rows: side(grid.rows) };
+            let block = grid.grown(&core, 3 * rng.below(7) as u32);
+            let mesh = TileMesh::load(&index, Owned::Cells(&core), &block).unwrap();
+            let (found, unsettled) = grains(&mesh);
+            assert!(unsettled.is_sorted_by(|a, b| a < b) && unsettled.iter().all(|&t| mesh.in_core[t as usize]));
+            let unsettled: Vec<u64> = unsettled.iter().map(|&t| mesh.triangle_id(t)).collect();
+            let own = |g: &&(Vec<u64>, _)| mesh.triangle_runs.local(g.0[0]).is_some_and(|t| mesh.in_core[t as usize]);
+            let named = |g: &(Vec<u64>, _)| unsettled.binary_search(&g.0[0]).is_ok();
+            let later: Vec<_> = truth.iter().filter(own).filter(|g| named(g)).collect();
+            let now: Vec<_> = truth.iter().filter(own).filter(|g| !named(g)).collect();
+            assert_eq!(now, found.iter().collect::<Vec<_>>(), "{name}, core {core:?}, loaded {block:?}");
+            if unsettled.is_empty() {
+                assert!(later.is_empty());
+                (settled, owned) = (settled + 1, owned + now.len());
+            } else {
+                (early, later_on) = (early + now.len(), later_on + later.len());
+            }
+        }
+    }
+    println!(
+        "{settled} of 900 tiles settled, with {owned} grains; in the others {early} are found at once, {later_on} not"
+    );
+    assert!(settled > 50 && owned > 20 && early > 30 && later_on > 50, "{settled} {owned} {early} {later_on}");
+}
