@@ -166,7 +166,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
 
     // tile by tile: segment and measure
     let outline_step_m = reach.frame().outline_step_m();
-    let wanted = Wanted { outline_step_m, triangle_ids: labelled };
+    let wanted = Wanted { outline_step_m, shape_prior: settings.measure.shape_prior(), triangle_ids: labelled };
     let method = match &divergence {
         None => Telling::Valleys(&settings.valleys),
         Some(divergence) => Telling::Rheinwalt2025(divergence.column()),

@@ -178,7 +178,11 @@ fn statistics_agree(name: &str, g: &Golden, mesh: &TileMesh, grains: &[Segment])
         let row = record.unwrap();
         rows.insert(row["segment id"] as i32, row);
     }
-    let wanted = Wanted { outline_step_m: 1.0 / 1_048_576.0, triangle_ids: false };
+    let wanted = Wanted {
+        outline_step_m: 1.0 / 1_048_576.0,
+        shape_prior: gravelometer::settings::ShapePrior::RIVER_GRAVEL,
+        triangle_ids: false,
+    };
     let mut worst = 0.0f64;
     for segment in grains {
         let row = &rows[&g.tri_seg[segment.triangles[0] as usize]];

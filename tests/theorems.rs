@@ -122,7 +122,11 @@ fn measured(surface: &MemorySurface) -> Grain {
     let inputs = index.vertex_inputs(0..index.scale.vertices).unwrap();
     let segment =
         Segment { triangles: (0..mesh.triangles.len() as u32).collect(), at_mesh_edge: false, evidence: None };
-    let wanted = Wanted { outline_step_m: 1.0 / 1_048_576.0, triangle_ids: false };
+    let wanted = Wanted {
+        outline_step_m: 1.0 / 1_048_576.0,
+        shape_prior: gravelometer::settings::ShapePrior::RIVER_GRAVEL,
+        triangle_ids: false,
+    };
     measure(&mesh, &segment, wanted, &|v| {
         Some(surface.colors.get(inputs[v as usize] as usize)?.map(|c| f64::from(c) / 255.0))
     })

@@ -41,7 +41,7 @@ fn all_hows() -> Vec<How> {
         how("shorter reaches", |_, _| {}),
         how("default reaches", |_, v| *v = ValleySettings::default()),
         how("nothing smoothed, no bridges cut", |_, v| (v.normal_passes, v.bridge_edges) = (0, 0.0)),
-        how("many joins", |_, v| (v.join_rise, v.join_hollow, v.join_swallowed) = (0.3, 0.3, 2.0)),
+        how("many joins", |_, v| (v.join_rise, v.join_swallowed) = (0.3, 2.0)),
         how("no joins, no growth", |_, v| (v.join_reach, v.growth_edges) = (0.0, 0.0)),
         how("everything is a stone", |_, v| v.stone_score = -10.0),
         how("most is sand", |_, v| v.stone_score = 1.4),

@@ -1,5 +1,6 @@
 //! A grain: what one settled segment of the surface says about the stone under it.
 
+use super::completed::Completed;
 use crate::geometry::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -11,7 +12,7 @@ pub type Polygon = Vec<Vec<[i64; 2]>>;
 /// One grain, all lengths in metres, local frame.
 ///
 /// It is measured from the visible part of the stone only: buried and hidden flanks are not guessed, so
-/// `axes_m[2]`, volume and hull area are lower bounds.
+/// `axes_m[2]`, volume and hull area are lower bounds. Only `completed` guesses, and says how surely.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Grain {
     /// Smallest global triangle id of the grain: names it whatever the tiling.
@@ -30,6 +31,8 @@ pub struct Grain {
     pub directions: [DVec3; 3],
     /// Full axes of the least-squares ellipsoid, a >= b >= c; none where no ellipsoid fits.
     pub ellipsoid_axes_m: Option<[f64; 3]>,
+    /// Axes of the stone completed by what is buried; none where too little is seen for a fit.
+    pub completed: Option<Completed>,
     /// Summed area of the triangles.
     pub surface_area_m2: f64,
     /// Area of the convex hull, both sides of a flat one; NaN where no hull could be made.

@@ -2,6 +2,8 @@
 
 pub mod attitude;
 mod axes;
+mod body;
+mod completed;
 mod ellipsoid;
 mod grain;
 mod outline;
@@ -9,6 +11,7 @@ mod patch;
 pub mod shape;
 
 pub use axes::{Axes, axes};
+pub use completed::{Completed, completed};
 pub use ellipsoid::ellipsoid_axes;
 pub use grain::{Grain, Polygon};
 pub use outline::outline;
@@ -16,6 +19,7 @@ pub use patch::Patch;
 
 use crate::geometry::{DVec3, hull, triangle_area, triangle_centroid};
 use crate::segment::Segment;
+use crate::settings::ShapePrior;
 use crate::tile::TileMesh;
 
 /// What measuring needs besides the mesh.
@@ -23,6 +27,8 @@ use crate::tile::TileMesh;
 pub struct Wanted {
     /// Step of the outline grid, metres.
     pub outline_step_m: f64,
+    /// What is expected of the shape of stones, where they are buried.
+    pub shape_prior: ShapePrior,
     /// Whether the grain keeps its triangle ids, for a labelled mesh.
     pub triangle_ids: bool,
 }
@@ -54,6 +60,7 @@ pub fn measure(
         axes_m: box_axes.extents_m,
         directions: box_axes.directions,
         ellipsoid_axes_m: ellipsoid_axes(points),
+        completed: completed(&patch, &box_axes, &wanted.shape_prior),
         surface_area_m2,
         hull_area_m2: hull.map_or(f64::NAN, |h| h.area_m2),
         hull_volume_m3: hull.map_or(f64::NAN, |h| h.volume_m3),

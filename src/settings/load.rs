@@ -141,6 +141,17 @@ impl Settings {
             c.stencil_spacings.is_finite() && c.stencil_spacings > 0.0,
             "must be a finite number above 0",
         )?;
+        let m = &self.measure;
+        for (key, value) in [("measure.prior_c_over_b", m.prior_c_over_b), ("measure.prior_b_over_a", m.prior_b_over_a)]
+        {
+            range(key, value, (0.01..=1.0).contains(&value), "must lie in 0.01 to 1")?;
+        }
+        for (key, value) in [
+            ("measure.prior_c_over_b_spread", m.prior_c_over_b_spread),
+            ("measure.prior_b_over_a_spread", m.prior_b_over_a_spread),
+        ] {
+            range(key, value, (0.05..=2.0).contains(&value), "must lie in 0.05 to 2")?;
+        }
         let ratio = self.measure.equant_ratio;
         range("measure.equant_ratio", ratio, ratio.is_finite() && ratio >= 1.0, "must be a finite number, 1 or more")?;
         range("work.threads", self.work.threads, self.work.threads <= 1024, "must be at most 1024")?;
@@ -262,6 +273,11 @@ mod tests {
     fn a_value_out_of_range_is_refused_with_its_key() {
         let error = Settings::load(None, &["segment.min_sphericity=1.5".into()]).expect_err("range").to_string();
         assert!(error.contains("segment.min_sphericity = 1.5"), "{error}");
+        for (key, value) in [("prior_c_over_b", "1.2"), ("prior_b_over_a", "0"), ("prior_c_over_b_spread", "0.01")] {
+            let assignment = format!("measure.{key}={value}");
+            let error = Settings::load(None, &[assignment]).expect_err(key).to_string();
+            assert!(error.contains(&format!("measure.{key} = {value}: must lie in ")), "{error}");
+        }
     }
 
     #[test]

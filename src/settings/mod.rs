@@ -217,11 +217,60 @@ pub struct MeasureSettings {
     pub few_triangles: u64,
     /// Axis ratio (a/b or b/c) below which the attitude is flagged as undefined.
     pub equant_ratio: f64,
+    /// Usual c/b of the stones, a median, 0.01 to 1: what a half buried one is expected to be.
+    pub prior_c_over_b: f64,
+    /// How far c/b varies from stone to stone: standard deviation of ln(c/b), 0.05 to 2. Large: trust the fit alone.
+    pub prior_c_over_b_spread: f64,
+    /// Usual b/a of the stones, a median, 0.01 to 1.
+    pub prior_b_over_a: f64,
+    /// Standard deviation of ln(b/a), 0.05 to 2.
+    pub prior_b_over_a_spread: f64,
+}
+
+/// What is expected of the shape of stones before they are seen.
+///
+/// Ratios are medians; spreads are standard deviations of the ratio's natural logarithm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShapePrior {
+    /// c/b.
+    pub c_over_b: f64,
+    /// Standard deviation of ln(c/b).
+    pub c_over_b_spread: f64,
+    /// b/a.
+    pub b_over_a: f64,
+    /// Standard deviation of ln(b/a).
+    pub b_over_a_spread: f64,
+}
+
+impl ShapePrior {
+    /// Mixed river gravel: wide enough for slates and for cubes.
+    pub const RIVER_GRAVEL: ShapePrior =
+        ShapePrior { c_over_b: 0.6, c_over_b_spread: 0.35, b_over_a: 0.75, b_over_a_spread: 0.2 };
 }
 
 impl Default for MeasureSettings {
     fn default() -> Self {
-        MeasureSettings { few_triangles: 100, equant_ratio: 1.1 }
+        let prior = ShapePrior::RIVER_GRAVEL;
+        MeasureSettings {
+            few_triangles: 100,
+            equant_ratio: 1.1,
+            prior_c_over_b: prior.c_over_b,
+            prior_c_over_b_spread: prior.c_over_b_spread,
+            prior_b_over_a: prior.b_over_a,
+            prior_b_over_a_spread: prior.b_over_a_spread,
+        }
+    }
+}
+
+impl MeasureSettings {
+    /// What is expected of the shape of stones.
+    pub fn shape_prior(&self) -> ShapePrior {
+        ShapePrior {
+            c_over_b: self.prior_c_over_b,
+            c_over_b_spread: self.prior_c_over_b_spread,
+            b_over_a: self.prior_b_over_a,
+            b_over_a_spread: self.prior_b_over_a_spread,
+        }
     }
 }
 

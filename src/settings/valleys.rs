@@ -41,8 +41,6 @@ pub struct ValleySettings {
     pub join_reach_edges: f64,
     /// if the points of each rise over the tangent planes of the other by less than this, mean sine, 0 to 1,
     pub join_rise: f64,
-    /// lie less than this below the hull of both, as a share of the square root of their area, 0 to 1,
-    pub join_hollow: f64,
     /// and if other cores reach into that hull with less than this share of the smaller one's area, 0 to 10.
     pub join_swallowed: f64,
 }
@@ -61,10 +59,9 @@ impl Default for ValleySettings {
             overhang_cost: 8.0,
             sand_delay_edges: 4.0,
             stone_score: 0.6,
-            join_reach: 1.5,
-            join_reach_edges: 30.0,
+            join_reach: 1.65,
+            join_reach_edges: 32.0,
             join_rise: 0.02,
-            join_hollow: 0.02,
             join_swallowed: 0.1,
         }
     }
@@ -108,7 +105,6 @@ impl ValleySettings {
             join_reach 0.0 10.0;
             join_reach_edges 0.0 50.0;
             join_rise 0.0 1.0;
-            join_hollow 0.0 1.0;
             join_swallowed 0.0 10.0;
         }
         Ok(())

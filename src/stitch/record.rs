@@ -7,7 +7,7 @@
 use super::TileFinding;
 
 /// First byte of every record. It must change when a field of [`TileFinding`] or of what it holds does.
-const FORMAT: u8 = 1;
+const FORMAT: u8 = 2;
 
 /// Bytes that hold no finding.
 #[derive(Debug, thiserror::Error)]
@@ -84,7 +84,7 @@ impl TileFinding {
 mod tests {
     use super::*;
     use crate::geometry::{DVec3, ExactSum, PlanBox};
-    use crate::measure::Grain;
+    use crate::measure::{Completed, Grain};
     use crate::segment::OversizePiece;
     use crate::stitch::TileReport;
     use proptest::collection::vec;
@@ -113,12 +113,18 @@ mod tests {
         [number(), number(), number()]
     }
 
+    fn completed() -> impl Strategy<Value = Completed> {
+        (three(), [number(), number()], any::<bool>()).prop_map(|(axes_m, [c_error_m, seen_share], c_from_prior)| {
+            Completed { axes_m, c_error_m, seen_share, c_from_prior }
+        })
+    }
+
     fn grain() -> impl Strategy<Value = Grain> {
         let outline = vec(vec(vec(any::<[i64; 2]>(), 0..5), 0..4), 0..3);
         (
             [whole_number(), whole_number(), whole_number()],
             ([vector(), vector(), vector(), vector()], three(), [number(), number(), number(), number(), number()]),
-            (option::of(three()), option::of(three()), option::of(three())),
+            (option::of(three()), option::of(three()), option::of(three()), option::of(completed())),
             (any::<bool>(), outline, vec(whole_number(), 0..20)),
         )
             .prop_map(|([anchor, triangles, vertices], (vectors, axes_m, scalars), optional, rest)| Grain {
@@ -130,6 +136,7 @@ mod tests {
                 axes_m,
                 directions: [vectors[1], vectors[2], vectors[3]],
                 ellipsoid_axes_m: optional.0,
+                completed: optional.3,
                 surface_area_m2: scalars[1],
                 hull_area_m2: scalars[2],
                 hull_volume_m3: scalars[3],
@@ -200,6 +207,10 @@ mod tests {
             );
             all.extend([g.top_z, g.surface_area_m2, g.hull_area_m2, g.hull_volume_m3, g.footprint_area_m2]);
             all.extend(g.axes_m);
+            if let Some(c) = &g.completed {
+                all.extend(c.axes_m);
+                all.extend([c.c_error_m, c.seen_share]);
+            }
             all.extend([g.ellipsoid_axes_m, g.color_mean, g.color_std].iter().flatten().flatten());
         }
         all.into_iter().map(f64::to_bits).collect()

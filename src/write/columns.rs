@@ -122,13 +122,19 @@ pub const COLUMNS: &[Column] = columns! {
     "ellipsoid_a_axis_m" Real "long axis of the least-squares ellipsoid; none where no ellipsoid fits" |r| Value::maybe(r.grain.ellipsoid_axes_m.map(|e| e[0]));
     "ellipsoid_b_axis_m" Real "intermediate axis of the same" |r| Value::maybe(r.grain.ellipsoid_axes_m.map(|e| e[1]));
     "ellipsoid_c_axis_m" Real "short axis of the same" |r| Value::maybe(r.grain.ellipsoid_axes_m.map(|e| e[2]));
+    "a_fit_m" Real "long axis of the completed stone: a rounded body fitted to the visible part, and to the usual shape of stones; none where too little is seen" |r| Value::maybe(r.grain.completed.map(|c| c.axes_m[0]));
+    "b_fit_m" Real "intermediate axis of the completed stone" |r| Value::maybe(r.grain.completed.map(|c| c.axes_m[1]));
+    "c_fit_m" Real "short axis of the completed stone, with what is buried" |r| Value::maybe(r.grain.completed.map(|c| c.axes_m[2]));
+    "c_fit_error_m" Real "one standard deviation of c_fit_m" |r| Value::maybe(r.grain.completed.map(|c| c.c_error_m));
+    "seen_share" Real "share of the completed stone's surface that is visible, 0 to 1" |r| Value::maybe(r.grain.completed.map(|c| c.seen_share));
+    "c_fit_from_prior" Boolean "c_fit_m rests more on measure.prior_c_over_b than on the surface" |r| r.grain.completed.map_or(Value::Null, |c| Value::Boolean(c.c_from_prior));
     "yaw_deg" Real "ZYX Tait-Bryan angle about the vertical that turns east-north-up into a-b-c, east towards north" |r| Value::real(r.attitude.yaw_deg);
     "pitch_deg" Real "second angle of the same, positive with a downward" |r| Value::real(r.attitude.pitch_deg);
     "roll_deg" Real "third angle of the same, about a" |r| Value::real(r.attitude.roll_deg);
-    "a_trend_deg" Real "azimuth of the lower end of a, clockwise from grid north; none where a is vertical" |r| Value::maybe(r.attitude.a_trend_deg);
+    "a_trend_deg" Real "azimuth of the lower end of a, clockwise from grid north; none where a is vertical, arbitrary where near_equant_ab" |r| Value::maybe(r.attitude.a_trend_deg);
     "a_plunge_deg" Real "angle of a below the horizon, 0 to 90" |r| Value::real(r.attitude.a_plunge_deg);
     "ab_dip_deg" Real "dip of the a-b plane from the horizontal, 0 to 90" |r| Value::real(r.attitude.ab_dip_deg);
-    "ab_dip_direction_deg" Real "azimuth of steepest descent of the a-b plane, clockwise from grid north; none where it is level" |r| Value::maybe(r.attitude.ab_dip_direction_deg);
+    "ab_dip_direction_deg" Real "azimuth of steepest descent of the a-b plane, clockwise from grid north; none where it is level, arbitrary where near_equant_bc" |r| Value::maybe(r.attitude.ab_dip_direction_deg);
     "red_mean" Real "mean of the vertices' red, 0 to 1; none where the mesh has no colours" |r| color(r.grain.color_mean, 0);
     "green_mean" Real "mean green" |r| color(r.grain.color_mean, 1);
     "blue_mean" Real "mean blue" |r| color(r.grain.color_mean, 2);
@@ -152,8 +158,8 @@ pub const COLUMNS: &[Column] = columns! {
     "triangles" Integer "number of triangles" |r| whole(r.grain.triangles);
     "touches_edge" Boolean "an edge of the mesh (survey border, scan shadow) bounds the grain: sizes are lower bounds" |r| Value::Boolean(r.grain.touches_edge);
     "few_triangles" Boolean "fewer triangles than measure.few_triangles: sizes are coarse" |r| Value::Boolean(r.grain.triangles < r.settings.measure.few_triangles);
-    "near_equant_ab" Boolean "a/b below measure.equant_ratio: yaw, pitch, roll, trend and plunge are undefined" |r| Value::Boolean(near_equant(r.grain.axes_m, &r.settings.measure).0);
-    "near_equant_bc" Boolean "b/c below measure.equant_ratio: roll, dip and dip direction are undefined" |r| Value::Boolean(near_equant(r.grain.axes_m, &r.settings.measure).1);
+    "near_equant_ab" Boolean "a/b below measure.equant_ratio: yaw, pitch, roll, trend and plunge are given but undefined" |r| Value::Boolean(near_equant(r.grain.axes_m, &r.settings.measure).0);
+    "near_equant_bc" Boolean "b/c below measure.equant_ratio: roll, dip and dip direction are given but undefined" |r| Value::Boolean(near_equant(r.grain.axes_m, &r.settings.measure).1);
 };
 
 fn whole(value: u64) -> Value {

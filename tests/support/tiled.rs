@@ -10,7 +10,11 @@ use gravelometer::stitch::{Catalogue, TileReport, stitch};
 use gravelometer::tile::{CoreSize, Plan};
 use std::convert::Infallible;
 
-pub const WANTED: Wanted = Wanted { outline_step_m: 1.0 / 1_048_576.0, triangle_ids: true };
+pub const WANTED: Wanted = Wanted {
+    outline_step_m: 1.0 / 1_048_576.0,
+    shape_prior: gravelometer::settings::ShapePrior::RIVER_GRAVEL,
+    triangle_ids: true,
+};
 
 #[derive(Debug, Clone, Copy)]
 pub struct Tiling {

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use gravelometer::geometry::PlanBox;
 use gravelometer::index::Scale;
-use gravelometer::measure::{Grain, Polygon};
+use gravelometer::measure::{Completed, Grain, Polygon};
 use gravelometer::open::{Crs, Frame};
 use gravelometer::settings::Settings;
 use gravelometer::stitch::{Catalogue, NumberedGrain, Oversize, TileReport};
@@ -102,6 +102,12 @@ fn grain(i: usize) -> Grain {
         axes_m: [b * 1.05 * (1.0 + (i % 5) as f64 * 0.2), b, b * (0.95 - (i % 7) as f64 * 0.1)],
         directions: [rotation.x_axis, rotation.y_axis, rotation.z_axis],
         ellipsoid_axes_m: (!i.is_multiple_of(3)).then_some([b * 1.5, b, b * 0.7]),
+        completed: (!i.is_multiple_of(5)).then_some(Completed {
+            axes_m: [b * 1.4, b, b * 0.65],
+            c_error_m: b * 0.1,
+            seen_share: 0.01 * (i % 100) as f64,
+            c_from_prior: i.is_multiple_of(2),
+        }),
         surface_area_m2: b * b * 2.0,
         hull_area_m2: b * b * 4.5,
         hull_volume_m3: b * b * b * 0.6,

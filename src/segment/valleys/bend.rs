@@ -3,7 +3,7 @@
 use super::neighbours::Neighbours;
 use super::normals::Normals;
 use crate::geometry::DVec3;
-use glam::Vec3;
+use glam::Vec3A;
 use rayon::prelude::*;
 
 /// Bending at a vertex, as a share of 1 over the mean edge length; above 0 on a stone's top, below in a valley.
@@ -13,7 +13,13 @@ pub struct Bend {
     pub least: f32,
     /// Mean curvature.
     pub mean: f32,
+    /// Whether an edge from the vertex spans a gap: it is longer than [`GAP_EDGES`].
+    pub gap: bool,
 }
+
+/// Edges longer than this, in mean edge lengths, span a gap. So a vertex of a core has all its triangles near by, and one
+/// that is not loaded lies this near the cut at most.
+pub const GAP_EDGES: f64 = 10.0;
 
 /// Bending at all vertices: the symmetric 2x2 matrix that best tells, in the tangent plane, the change of the normal
 /// along each edge from the edge (least squares over the ring; Rusinkiewicz 2004, doi:10.1109/TDPVT.2004.1335277, does
@@ -23,20 +29,24 @@ pub fn bends(positions: &[DVec3], neighbours: &Neighbours, normals: &Normals, me
         let normal = normals.unit[v];
         let [east, north] = tangents(normal);
         let mut fit = Fit::default();
+        let mut longest = 0.0f32;
         for &u in neighbours.around(v) {
-            let edge = (positions[u as usize] - positions[v]).as_vec3();
+            let edge = (positions[u as usize] - positions[v]).as_vec3a();
+            longest = longest.max(edge.length_squared());
             let change = normals.unit[u as usize] - normal;
             fit.add([edge.dot(east), edge.dot(north)], [change.dot(east), change.dot(north)]);
         }
         let unit = mean_edge_m as f32;
-        fit.curvatures().map_or(Bend::default(), |[least, mean]| Bend { least: least * unit, mean: mean * unit })
+        let gap = longest > (GAP_EDGES * GAP_EDGES) as f32 * unit * unit;
+        let [least, mean] = fit.curvatures().unwrap_or_default();
+        Bend { least: least * unit, mean: mean * unit, gap }
     };
     (0..positions.len()).into_par_iter().with_min_len(1 << 12).map(bend).collect()
 }
 
 /// Two unit vectors across a normal and each other.
-fn tangents(normal: Vec3) -> [Vec3; 2] {
-    let aside = if normal.x.abs() < 0.7 { Vec3::X } else { Vec3::Y };
+fn tangents(normal: Vec3A) -> [Vec3A; 2] {
+    let aside = if normal.x.abs() < 0.7 { Vec3A::X } else { Vec3A::Y };
     let east = normal.cross(aside).normalize_or_zero();
     [east, normal.cross(east)]
 }

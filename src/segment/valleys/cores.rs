@@ -7,7 +7,7 @@ use super::{NONE, UNKNOWN};
 use crate::geometry::DVec3;
 use crate::segment::components::Forest;
 use crate::settings::ValleySettings;
-use glam::Vec3;
+use glam::Vec3A;
 use rayon::prelude::*;
 
 /// Vertices that one thread joins at a time.
@@ -22,7 +22,7 @@ pub struct Ground<'g> {
     /// Bending of each vertex; of no meaning where it is unknown, as the normals.
     pub bends: &'g [Bend],
     /// Smoothed normals.
-    pub normals: &'g [Vec3],
+    pub normals: &'g [Vec3A],
     /// Vertices whose bending hangs on what is not loaded; none where everything is.
     pub unknown: Option<&'g [bool]>,
     /// A third of the triangles around each vertex, m².
@@ -34,8 +34,7 @@ pub struct Ground<'g> {
 impl Ground<'_> {
     /// Whether a vertex lies in a valley, or at an edge that spans a gap.
     fn divides(&self, v: usize, settings: &ValleySettings) -> bool {
-        f64::from(self.bends[v].least) < -settings.valley_depth
-            || self.neighbours.around(v).iter().any(|&u| self.edges(v, u as usize) > GAP_EDGES)
+        f64::from(self.bends[v].least) < -settings.valley_depth || self.bends[v].gap
     }
 
     fn is_unknown(&self, v: usize) -> bool {
@@ -49,9 +48,6 @@ impl Ground<'_> {
     }
 }
 
-/// Edges longer than this span a gap. So a vertex of a core has all its triangles near by, and one that is not loaded
-/// lies this near the cut at most.
-pub const GAP_EDGES: f64 = 10.0;
 /// The cores of a tile.
 pub struct Cores {
     /// Core of each vertex; [`NONE`], or [`UNKNOWN`].

@@ -4,9 +4,10 @@
 //! They need not touch: what lies in front of a stone may part what is seen of it.
 
 use super::UNKNOWN;
-use super::cores::{GAP_EDGES, Ground};
+use super::bend::GAP_EDGES;
+use super::cores::Ground;
 use super::judge::{Judged, Kind};
-use crate::geometry::{DVec3, ExactSum, PlanBox, Supports, mean_depth};
+use crate::geometry::{DVec3, ExactSum, PlanBox, Supports};
 use crate::segment::components::Forest;
 use crate::settings::ValleySettings;
 use rayon::prelude::*;
@@ -157,10 +158,6 @@ fn one(
         }
     }
     let both: Vec<DVec3> = a.points.iter().chain(&b.points).copied().collect();
-    let side_m = (first.area_m2 + second.area_m2).sqrt();
-    if mean_depth(&both, &both) >= settings.join_hollow * side_m {
-        return Some(Some(false));
-    }
     let mut bounds = first.bounds;
     bounds.merge(&second.bounds);
     if !sure.holds(&bounds) {

@@ -92,12 +92,15 @@ impl Means {
 }
 
 fn kind(ground: &Ground, vertices: &[u32], means: &Means, settings: &ValleySettings) -> Kind {
-    let points: Vec<DVec3> = vertices.iter().map(|&v| ground.positions[v as usize]).collect();
     // The sphericity that makes a score, which bounds of the hull mostly decide.
     let sphericity = |score: f64| score - ROUNDNESS * means.roundness;
+    if sphericity(settings.stone_score) <= 0.0 && means.up <= LEVEL {
+        return Kind::Stone;
+    }
+    let points: Vec<DVec3> = vertices.iter().map(|&v| ground.positions[v as usize]).collect();
     if means.up > LEVEL {
         let least = sphericity(settings.stone_score);
-        if flatter_than(&points, least) {
+        if least > 0.0 && flatter_than(&points, least) {
             return Kind::Sheet;
         }
         let depth = mean_depth(&points, &points) / means.area_m2.sqrt();

@@ -74,12 +74,12 @@ struct InBand {
 impl InBand {
     fn of(bands: &Bands, vertices: Range<usize>) -> InBand {
         let place = |v: u32| (v as usize).wrapping_sub(vertices.start);
-        let corners = || bands.near(&vertices).flat_map(|block| &bands.mesh.triangles[block]);
+        let blocks: Vec<&[[u32; 3]]> = bands.near(&vertices).map(|block| &bands.mesh.triangles[block]).collect();
         // Two for each corner, of which most come twice.
         let mut end = vec![0u32; vertices.len() + 1];
-        for &v in corners().flatten() {
-            if let Some(count) = end.get_mut(place(v)).filter(|_| place(v) < vertices.len()) {
-                *count += 2;
+        for &v in blocks.iter().flat_map(|block| block.as_flattened()) {
+            if place(v) < vertices.len() {
+                end[place(v)] += 2;
             }
         }
         let mut total = 0;
@@ -87,7 +87,7 @@ impl InBand {
             total += std::mem::replace(end, total);
         }
         let mut named = vec![0u32; total as usize];
-        for &[a, b, c] in corners() {
+        for &[a, b, c] in blocks.iter().copied().flatten() {
             for [v, next, other] in [[a, b, c], [b, c, a], [c, a, b]] {
                 if place(v) < vertices.len() {
                     let at = end[place(v)] as usize;

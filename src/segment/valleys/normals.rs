@@ -3,13 +3,13 @@
 use super::neighbours::Neighbours;
 use crate::geometry::triangle_area;
 use crate::segment::bands::Bands;
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3A};
 use rayon::prelude::*;
 
 /// Normals and areas of the vertices of a tile.
 pub struct Normals {
     /// Unit normals by the right-hand rule; zero where none is.
-    pub unit: Vec<Vec3>,
+    pub unit: Vec<Vec3A>,
     /// A third of the triangles around each vertex, m².
     pub area_m2: Vec<f32>,
 }
@@ -27,7 +27,7 @@ impl Normals {
             sum.0 += normal;
             sum.1 += area / 3.0;
         });
-        let unit = sums.par_iter().map(|(normal, _)| normal.normalize_or_zero().as_vec3()).collect();
+        let unit = sums.par_iter().map(|(normal, _)| normal.normalize_or_zero().as_vec3a()).collect();
         Normals { unit, area_m2: sums.par_iter().map(|(_, area)| *area as f32).collect() }
     }
 
@@ -37,7 +37,7 @@ impl Normals {
     /// What a vertex gets depends on as many rings of neighbours as there are passes.
     pub fn smooth(&mut self, neighbours: &Neighbours, passes: u32, crease: f32) {
         let sharpness = 1.0 / (crease * crease);
-        let mut next = vec![Vec3::ZERO; self.unit.len()];
+        let mut next = vec![Vec3A::ZERO; self.unit.len()];
         for _ in 0..passes {
             let (unit, area) = (&self.unit, &self.area_m2);
             next.par_iter_mut().enumerate().with_min_len(1 << 12).for_each(|(v, next)| {
