@@ -18,7 +18,7 @@ use crate::resume::{ResumeError, WORK, WorkFolder, changes_since_finished, whole
 use crate::segment::smallest_grain_area_m2;
 use crate::settings::{Instructions, Method, Settings};
 use crate::statistics::RasterGrid;
-use crate::stitch::{Catalogue, TileReport, stitch};
+use crate::stitch::{Catalogue, TileReport, leave_out, stitch};
 use crate::store::Shelf;
 use crate::surfaces::{WholeSurface, tell_of_weld};
 use crate::tile::Plan;
@@ -194,7 +194,9 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
 
     // stitch
     let touch_steps = (TOUCH_EDGES * index.scale.mean_edge_m / outline_step_m) as i64;
-    let (catalogue, tiles) = stitch(findings.all(&plan)?, touch_steps);
+    let mut found = findings.all(&plan)?;
+    let left_out = leave_out(&mut found, settings.measure.min_confidence);
+    let (catalogue, tiles) = stitch(found, touch_steps);
 
     // statistics and write
     let figures = work.figures();
@@ -207,6 +209,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let segmented_per_triangle = segmented_per_triangle(&tiles, probe.segmented);
     facts["segmented_per_triangle"] = segmented_per_triangle.into();
     facts["curvature_per_triangle"] = curvature_per_triangle.into();
+    facts["grains_below_min_confidence"] = left_out.into();
     facts["identity"] = whole_identity(&reach, settings).into();
     facts["weld"] = serde_json::json!(weld);
     facts["surface"] = serde_json::json!(figures);

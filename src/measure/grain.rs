@@ -2,6 +2,7 @@
 
 use super::completed::Completed;
 use crate::geometry::DVec3;
+use crate::segment::Evidence;
 use serde::{Deserialize, Serialize};
 
 /// One polygon of an outline: the outer ring counter-clockwise, holes clockwise, none closed (the first
@@ -47,6 +48,8 @@ pub struct Grain {
     pub color_std: Option<[f64; 3]>,
     /// Whether an edge of the mesh (survey border, scan shadow) bounds the grain.
     pub touches_edge: bool,
+    /// What speaks for it; none where the method does not tell.
+    pub evidence: Option<Evidence>,
     /// Outline in plan: union of the projected triangles.
     pub outline: Vec<Polygon>,
     /// Global triangle ids, ascending; empty unless a labelled mesh was asked for.

@@ -4,6 +4,7 @@ pub mod attitude;
 mod axes;
 mod body;
 mod completed;
+pub mod confidence;
 mod ellipsoid;
 mod grain;
 mod outline;
@@ -68,6 +69,7 @@ pub fn measure(
         color_mean,
         color_std,
         touches_edge: segment.at_mesh_edge,
+        evidence: segment.evidence,
         outline,
         triangle_ids: if wanted.triangle_ids { ids().collect() } else { Vec::new() },
     }

@@ -60,6 +60,15 @@ impl Identity {
                 self
             }
         };
+        let prior = settings.measure.shape_prior();
+        for (name, value) in [
+            ("prior_c_over_b", prior.c_over_b),
+            ("prior_c_over_b_spread", prior.c_over_b_spread),
+            ("prior_b_over_a", prior.b_over_a),
+            ("prior_b_over_a_spread", prior.b_over_a_spread),
+        ] {
+            self.0.insert(format!("measure.{name}"), value.into());
+        }
         self.0.insert("output.labelled_mesh".into(), settings.output.labelled_mesh.into());
         self.0.insert("output.labelled_cloud".into(), settings.output.labelled_cloud.into());
         self.0.insert("step of outlines, metres".into(), outline_step_m.to_string().into());

@@ -36,7 +36,7 @@ pub struct Settled {
 }
 
 /// What speaks for a grain, as far as the method tells; of vertices, areas in m².
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Evidence {
     /// Mean of the least bending along the rim, in 1 over the mean edge length: how sharp its border is; far below 0 where
     /// valleys surround it.

@@ -154,6 +154,8 @@ impl Settings {
         }
         let ratio = self.measure.equant_ratio;
         range("measure.equant_ratio", ratio, ratio.is_finite() && ratio >= 1.0, "must be a finite number, 1 or more")?;
+        let least = self.measure.min_confidence;
+        range("measure.min_confidence", least, (0.0..=1.0).contains(&least), "must lie in 0 to 1")?;
         range("work.threads", self.work.threads, self.work.threads <= 1024, "must be at most 1024")?;
         range(
             "work.memory",

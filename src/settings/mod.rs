@@ -217,6 +217,9 @@ pub struct MeasureSettings {
     pub few_triangles: u64,
     /// Axis ratio (a/b or b/c) below which the attitude is flagged as undefined.
     pub equant_ratio: f64,
+    /// Grains with a lower confidence are left out of all results, 0 to 1; 0 keeps all. Only the method `valleys` tells
+    /// how sure it is.
+    pub min_confidence: f64,
     /// Usual c/b of the stones, a median, 0.01 to 1: what a half buried one is expected to be.
     pub prior_c_over_b: f64,
     /// How far c/b varies from stone to stone: standard deviation of ln(c/b), 0.05 to 2. Large: trust the fit alone.
@@ -254,6 +257,7 @@ impl Default for MeasureSettings {
         MeasureSettings {
             few_triangles: 100,
             equant_ratio: 1.1,
+            min_confidence: 0.0,
             prior_c_over_b: prior.c_over_b,
             prior_c_over_b_spread: prior.c_over_b_spread,
             prior_b_over_a: prior.b_over_a,

@@ -13,6 +13,7 @@ pub use catalogue::{Catalogue, NumberedGrain, Oversize, TileReport};
 pub use record::RecordError;
 
 use crate::measure::Grain;
+use crate::measure::confidence::confidence;
 use crate::segment::OversizePiece;
 use serde::{Deserialize, Serialize};
 
@@ -25,6 +26,20 @@ pub struct TileFinding {
     pub oversize: Vec<OversizePiece>,
     /// How it was worked.
     pub report: TileReport,
+}
+
+/// Leaves out the grains of which the method is less sure than `least`, and gives how many; those whose method does not tell
+/// stay.
+pub fn leave_out(findings: &mut [TileFinding], least: f64) -> u64 {
+    let mut left_out = 0;
+    for finding in findings {
+        let before = finding.grains.len();
+        finding.grains.retain(|grain| confidence(grain).is_none_or(|c| c >= least));
+        let gone = (before - finding.grains.len()) as u64;
+        finding.report.grains -= gone;
+        left_out += gone;
+    }
+    left_out
 }
 
 /// Joins the findings of all tiles, in any order. `touch_steps` is the distance, in steps of the outline

@@ -85,7 +85,7 @@ mod tests {
     use super::*;
     use crate::geometry::{DVec3, ExactSum, PlanBox};
     use crate::measure::{Completed, Grain};
-    use crate::segment::OversizePiece;
+    use crate::segment::{Evidence, OversizePiece};
     use crate::stitch::TileReport;
     use proptest::collection::vec;
     use proptest::option;
@@ -119,13 +119,25 @@ mod tests {
         })
     }
 
+    fn evidence() -> impl Strategy<Value = Evidence> {
+        ([number(), number(), number(), number()], any::<u32>()).prop_map(
+            |([rim_bend, free_rim, roundness, core_share], patches)| Evidence {
+                rim_bend,
+                free_rim,
+                roundness,
+                core_share,
+                patches,
+            },
+        )
+    }
+
     fn grain() -> impl Strategy<Value = Grain> {
         let outline = vec(vec(vec(any::<[i64; 2]>(), 0..5), 0..4), 0..3);
         (
             [whole_number(), whole_number(), whole_number()],
             ([vector(), vector(), vector(), vector()], three(), [number(), number(), number(), number(), number()]),
             (option::of(three()), option::of(three()), option::of(three()), option::of(completed())),
-            (any::<bool>(), outline, vec(whole_number(), 0..20)),
+            (any::<bool>(), outline, vec(whole_number(), 0..20), option::of(evidence())),
         )
             .prop_map(|([anchor, triangles, vertices], (vectors, axes_m, scalars), optional, rest)| Grain {
                 anchor,
@@ -144,6 +156,7 @@ mod tests {
                 color_mean: optional.1,
                 color_std: optional.2,
                 touches_edge: rest.0,
+                evidence: rest.3,
                 outline: rest.1,
                 triangle_ids: rest.2,
             })
@@ -212,6 +225,8 @@ mod tests {
                 all.extend([c.c_error_m, c.seen_share]);
             }
             all.extend([g.ellipsoid_axes_m, g.color_mean, g.color_std].iter().flatten().flatten());
+            let of = |e: Evidence| [e.rim_bend, e.free_rim, e.roundness, e.core_share];
+            all.extend(g.evidence.map(of).iter().flatten());
         }
         all.into_iter().map(f64::to_bits).collect()
     }

@@ -2,6 +2,7 @@
 
 use crate::measure::Grain;
 use crate::measure::attitude::Attitude;
+use crate::measure::confidence::confidence;
 use crate::measure::shape::{self, SneedFolk, Zingg};
 use crate::open::Frame;
 use crate::settings::Settings;
@@ -155,6 +156,12 @@ pub const COLUMNS: &[Column] = columns! {
     "sieve_diameter_m" Real "square sieve hole that the stone just passes, b sqrt((1+(c/b)^2)/2)" |r| Value::maybe(shape::sieve_diameter_m(r.grain.axes_m));
     "footprint_area_m2" Real "area of the outline in plan" |r| Value::real(r.grain.footprint_area_m2);
     "exposed_share" Real "visible surface over the surface of the ellipsoid with axes a, b, c" |r| Value::maybe(shape::exposed_share(r.grain.surface_area_m2, r.grain.axes_m));
+    "confidence" Real "chance that the grain is one whole stone, 0 to 1, from its border, shape and size; none for the published method" |r| Value::maybe(confidence(r.grain));
+    "patches" Integer "visible patches that were joined to this grain; none for the published method" |r| r.grain.evidence.map_or(Value::Null, |e| Value::Integer(i64::from(e.patches)));
+    "border_bend" Real "mean bending along its border, in 1 over the mean edge length: far below 0 where valleys surround it" |r| Value::maybe(r.grain.evidence.map(|e| e.rim_bend));
+    "free_border_share" Real "share of its border where it ends without meeting a stone or sand, 0 to 1" |r| Value::maybe(r.grain.evidence.map(|e| e.free_rim));
+    "roundness" Real "mean curvature times the square root of the area: 2.5 for half a ball, 0 for a plane" |r| Value::maybe(r.grain.evidence.map(|e| e.roundness));
+    "core_share" Real "share of its area that lies away from valleys" |r| Value::maybe(r.grain.evidence.map(|e| e.core_share));
     "triangles" Integer "number of triangles" |r| whole(r.grain.triangles);
     "touches_edge" Boolean "an edge of the mesh (survey border, scan shadow) bounds the grain: sizes are lower bounds" |r| Value::Boolean(r.grain.touches_edge);
     "few_triangles" Boolean "fewer triangles than measure.few_triangles: sizes are coarse" |r| Value::Boolean(r.grain.triangles < r.settings.measure.few_triangles);

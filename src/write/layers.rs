@@ -166,18 +166,25 @@ fn survey_feature(results: &Results) -> Feature {
 /// The table in which QGIS looks for the style of a layer.
 fn styles<'a>() -> Layer<'a> {
     let text = |t: &'static str| Value::Text(Cow::Borrowed(t));
-    let values = vec![
-        text(""),
-        text(""),
-        text("grains"),
-        text("geom"),
-        text("b axis"),
-        text(include_str!("grains.qml")),
-        text(""),
-        Value::Boolean(true),
-        text("grains by b axis in Wentworth classes"),
-        text(env!("CARGO_PKG_NAME")),
-        text(""),
+    let style = move |name, qml, default, description| {
+        let values = vec![
+            text(""),
+            text(""),
+            text("grains"),
+            text("geom"),
+            text(name),
+            text(qml),
+            text(""),
+            Value::Boolean(default),
+            text(description),
+            text(env!("CARGO_PKG_NAME")),
+            text(""),
+        ];
+        Feature { fid: None, values, wkb: None }
+    };
+    let all = [
+        style("b axis", include_str!("grains.qml"), true, "grains by b axis in Wentworth classes"),
+        style("confidence", include_str!("confidence.qml"), false, "grains by how sure their segmentation is"),
     ];
     Layer {
         name: "layer_styles",
@@ -196,7 +203,7 @@ fn styles<'a>() -> Layer<'a> {
             ("owner", Kind::Text),
             ("ui", Kind::Text),
         ],
-        features: Box::new(std::iter::once(Feature { fid: None, values, wkb: None })),
+        features: Box::new(all.into_iter()),
     }
 }
 

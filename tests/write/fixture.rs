@@ -115,6 +115,7 @@ fn grain(i: usize) -> Grain {
         color_mean: (i % 4 != 1).then_some([0.1, 0.25, 1.0 / 3.0]),
         color_std: (i % 4 != 1).then_some([0.01, 0.02, 0.03]),
         touches_edge: i.is_multiple_of(6),
+        evidence: None,
         outline: outline(i, x, y),
         triangle_ids: vec![2 * i as u64, 2 * i as u64 + 1],
     }
