@@ -107,11 +107,12 @@ fn another(section: &str, key: &str, value: &toml::Value) -> toml::Value {
     let candidates: Vec<toml::Value> = match value {
         toml::Value::Boolean(b) => vec![(!b).into()],
         toml::Value::Integer(i) => vec![(i + 1).into()],
-        toml::Value::Float(f) => vec![(f + 0.3).into()],
+        toml::Value::Float(f) => vec![(f + 0.3).into(), (0.9 * f).into()],
         toml::Value::Array(a) => vec![toml::Value::Array(vec![1.5.into(); a.len()])],
-        _ => {
-            ["mm", "triangle-count", "mean", "3GiB", "EPSG:2193", "scalar"].into_iter().map(toml::Value::from).collect()
-        }
+        _ => ["mm", "triangle-count", "mean", "3GiB", "EPSG:2193", "scalar", "rheinwalt2025"]
+            .into_iter()
+            .map(toml::Value::from)
+            .collect(),
     };
     let accepted = |v: &toml::Value| v != value && Settings::load(None, &[format!("{section}.{key}={v}")]).is_ok();
     candidates.into_iter().find(accepted).unwrap_or_else(|| panic!("{section}.{key}: no other value is accepted"))
@@ -312,7 +313,8 @@ fn a_survey_without_grains_is_a_result_with_all_its_files() {
 #[test]
 fn json_lines_are_json_and_tell_every_stage_from_begin_to_end() {
     let (folder, mesh) = scene();
-    let said = run(&mesh, &folder.path().join("out"), &["--log", "json"]);
+    let published = ["--set", "segment.method=rheinwalt2025"];
+    let said = run(&mesh, &folder.path().join("out"), &[&["--log", "json"], &published[..]].concat());
     assert_eq!((said.code, said.out.as_str()), (0, ""), "{}", said.err);
     let lines: Vec<serde_json::Value> = said.err.lines().map(|l| serde_json::from_str(l).expect(l)).collect();
     for stage in ["open", "index", "spacing", "curvature", "grains", "write"] {
@@ -323,7 +325,7 @@ fn json_lines_are_json_and_tell_every_stage_from_begin_to_end() {
         let end = lines.iter().find(|l| l["stage"] == stage && l["event"] == "end").unwrap();
         assert_eq!(end["done"], end["total"], "{stage}");
     }
-    let plain = run(&mesh, &folder.path().join("plain"), &[]);
+    let plain = run(&mesh, &folder.path().join("plain"), &published);
     assert!(plain.err.contains("curvature: ") && !plain.err.contains('\r'), "{}", plain.err);
 }
 
@@ -331,7 +333,7 @@ fn json_lines_are_json_and_tell_every_stage_from_begin_to_end() {
 fn every_stage_and_its_cost_are_in_the_table_and_in_run_json() {
     let (folder, mesh) = scene();
     let out = folder.path().join("out");
-    let said = run(&mesh, &out, &[]);
+    let said = run(&mesh, &out, &["--set", "segment.method=rheinwalt2025"]);
     assert_eq!(said.code, 0, "{}", said.err);
     let surface = bed(21, 60, 50);
     let triangles = surface.triangles.len() as u64;

@@ -10,7 +10,7 @@ use gravelometer::curvature::InstructionSet;
 use gravelometer::pipeline::Control;
 use gravelometer::progress::Silent;
 use gravelometer::run::{Job, Outcome, run};
-use gravelometer::settings::{InputSettings, Instructions, Settings};
+use gravelometer::settings::{InputSettings, Instructions, Method, Settings};
 use std::path::{Path, PathBuf};
 use support::bed::{bed, shuffled, write_ply};
 
@@ -25,6 +25,7 @@ struct Work {
 
 struct Scene {
     mesh: PathBuf,
+    method: Method,
     max_grain_m: f64,
     min_grain_area_m2: f64,
     folder: tempfile::TempDir,
@@ -33,6 +34,7 @@ struct Scene {
 impl Scene {
     fn run(&self, name: &str, work: &Work) -> (PathBuf, Outcome, u64) {
         let mut settings = Settings::default();
+        settings.segment.method = self.method;
         settings.segment.max_grain_m = self.max_grain_m;
         settings.segment.min_grain_area_m2 = self.min_grain_area_m2;
         settings.raster.cell_m = 0.5;
@@ -59,16 +61,16 @@ impl Scene {
     }
 }
 
-fn synthetic() -> Scene {
+fn synthetic(method: Method) -> Scene {
     let folder = tempfile::tempdir().unwrap();
     let mesh = folder.path().join("bed.ply");
     write_ply(&mesh, &shuffled(&bed(4, 150, 110), 8));
-    Scene { mesh, max_grain_m: 1.0, min_grain_area_m2: 0.004, folder }
+    Scene { mesh, method, max_grain_m: 1.0, min_grain_area_m2: 0.004, folder }
 }
 
-fn otira() -> Option<Scene> {
+fn otira(method: Method) -> Option<Scene> {
     let mesh = support::data("otira/otira_poisson.ply")?;
-    Some(Scene { mesh, max_grain_m: 1.2, min_grain_area_m2: 5e-3, folder: tempfile::tempdir().unwrap() })
+    Some(Scene { mesh, method, max_grain_m: 1.2, min_grain_area_m2: 5e-3, folder: tempfile::tempdir().unwrap() })
 }
 
 /// Size of the raster, its west and north border and cell, and the bits of all values.
@@ -178,22 +180,26 @@ fn labels(mesh: &[u8]) -> &[u8] {
 
 #[test]
 fn results_of_a_made_up_bed_depend_on_neither_tiles_nor_threads_nor_memory_nor_the_offset() {
-    let outcome = is_invariant(&synthetic(), [0.9, 0.25]);
-    let (grains, oversize) = (outcome.catalogue.grains.len(), outcome.catalogue.oversize.len());
-    println!("{grains} grains, {oversize} oversize");
-    assert!(grains > 20 && oversize > 0);
+    for method in [Method::Valleys, Method::Rheinwalt2025] {
+        let outcome = is_invariant(&synthetic(method), [0.9, 0.25]);
+        let (grains, oversize) = (outcome.catalogue.grains.len(), outcome.catalogue.oversize.len());
+        println!("{method:?}: {grains} grains, {oversize} oversize");
+        assert!(grains > 20 && (oversize > 0) == (method == Method::Rheinwalt2025));
+    }
 }
 
 #[test]
 fn results_of_the_otira_depend_on_neither_tiles_nor_threads_nor_memory_nor_the_offset() {
-    let Some(scene) = otira() else { return };
-    let outcome = is_invariant(&scene, [2.5, 0.7]);
-    assert_eq!((outcome.catalogue.grains.len(), outcome.catalogue.oversize.len()), (290, 2));
+    for (method, found) in [(Method::Valleys, (443, 0)), (Method::Rheinwalt2025, (290, 2))] {
+        let Some(scene) = otira(method) else { return };
+        let outcome = is_invariant(&scene, [2.5, 0.7]);
+        assert_eq!((outcome.catalogue.grains.len(), outcome.catalogue.oversize.len()), found, "{method:?}");
+    }
 }
 
 #[test]
 fn how_a_survey_is_placed_on_the_map_changes_its_positions_and_nothing_else() {
-    let scene = Scene { min_grain_area_m2: 1e-3, ..synthetic() };
+    let scene = Scene { min_grain_area_m2: 1e-3, ..synthetic(Method::Valleys) };
     let beside = |name: &str, text: &str| {
         let path = scene.folder.path().join(name);
         std::fs::write(&path, text).unwrap();

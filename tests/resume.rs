@@ -149,6 +149,26 @@ fn a_changed_setting_or_input_is_refused_by_name_and_nothing_is_touched() {
     assert!(results(here) == results(&elsewhere) && results(here) != scene.whole);
 }
 
+#[cfg(debug_assertions)]
+#[test]
+fn a_run_along_valleys_that_is_killed_is_completed_with_the_same_bytes() {
+    let scene = Scene::new();
+    let valleys = ["--set", "segment.method=valleys"];
+    scene.finishes(&scene.path("whole"), &valleys);
+    let whole = results(&scene.path("whole"));
+    assert!(whole != scene.whole);
+    for (i, at) in ["ledger.after_write:1", "ledger.after_write:4", "ledger.after_sync:2"].into_iter().enumerate() {
+        let out = scene.killed(&format!("killed-{i}"), at, &valleys);
+        assert!(results(&out).is_empty(), "{at}");
+        let said = said(scene.run(&out, &valleys).arg("--resume"));
+        assert_eq!(said.code, Some(0), "{at}: {}", said.err);
+        assert!(results(&out) == whole, "{at}: other results");
+    }
+    // The other method is another run.
+    let out = scene.killed("other", "ledger.after_write:4", &valleys);
+    said(scene.run(&out, &[]).arg("--resume")).fails(1, &["segment.method"]);
+}
+
 #[test]
 fn a_named_work_folder_is_used_again_by_a_run_with_another_threshold() {
     let scene = Scene::new();

@@ -8,7 +8,7 @@ pub use cost_table::cost_table;
 pub use report::{report_error, reporter};
 pub use validate_args::ValidateArgs;
 
-use crate::settings::{Settings, SettingsError, Unit};
+use crate::settings::{Method, Settings, SettingsError, Unit};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
@@ -131,7 +131,10 @@ pub struct SettingArgs {
     /// that of the CRS, metres without one]
     #[arg(long, value_enum, value_name = "UNIT", help_heading = "Coordinates")]
     pub unit: Option<Unit>,
-    /// Widest grain, metres; wider bodies are reported as oversize; 0: no limit [segment.max_grain_m;
+    /// How stones are told apart: along valleys, or as published [segment.method; default: valleys]
+    #[arg(long, value_enum, value_name = "METHOD", help_heading = "Grains")]
+    pub method: Option<Method>,
+    /// Widest grain, metres; wider bodies are no grains; 0: no limit [segment.max_grain_m;
     /// default: 2]
     #[arg(long, value_name = "METRES", allow_negative_numbers = true, help_heading = "Grains")]
     pub max_grain: Option<f64>,
@@ -188,6 +191,7 @@ impl SettingArgs {
         let offset_file = self.offset_file.as_ref().map(|path| path.to_string_lossy());
         set("input.offset_file", offset_file.as_deref().map(word));
         set("input.unit", self.unit.and_then(|u| u.to_possible_value().map(|v| word(v.get_name()))));
+        set("segment.method", self.method.and_then(|m| m.to_possible_value().map(|v| word(v.get_name()))));
         set("segment.max_grain_m", self.max_grain.map(number));
         set("segment.min_grain_area_m2", self.min_grain_area.map(number));
         set("work.tile_size_m", self.tile_size.map(number));

@@ -88,7 +88,7 @@ impl Default for SurfaceSettings {
     }
 }
 
-/// How curvature is computed (Rheinwalt et al. 2025, eq. 1 and 2).
+/// How the published method computes curvature (Rheinwalt et al. 2025, eq. 1 and 2); `valleys` does not ask.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CurvatureSettings {
@@ -144,8 +144,8 @@ pub enum ConcaveRule {
 pub struct SegmentSettings {
     /// How stones are told apart.
     pub method: Method,
-    /// Widest grain, metres (longer side of its box in plan); 0 for no limit. Wider bodies are reported
-    /// as oversize, never as grains. Decides how far a tile must look beyond its core.
+    /// Widest grain, metres (longer side of its box in plan); 0 for no limit. Wider bodies are no
+    /// grains; the published method reports them as oversize. Decides how far a tile must look beyond its core.
     pub max_grain_m: f64,
     /// Smallest grain, m² of visible surface.
     pub min_grain_area_m2: f64,
@@ -153,7 +153,7 @@ pub struct SegmentSettings {
     pub min_grain_triangles: f64,
     /// Whether the two limits above are held against areas or against triangle counts.
     pub area_rule: AreaRule,
-    /// How three vertices decide that a triangle is concave.
+    /// From here on of the published method. How three vertices decide that a triangle is concave.
     pub concave_rule: ConcaveRule,
     /// Divergence below which the surface is concave, in 1 per mean edge length; 0 as published.
     pub concave_below: f64,

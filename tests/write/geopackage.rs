@@ -35,7 +35,8 @@ fn every_layer_holds_its_features_and_an_index_of_all_of_them() {
         assert_eq!(count(&dataset, &format!("SELECT COUNT(*) FROM {layer}")), features, "{layer}");
         assert_eq!(count(&dataset, &format!("SELECT COUNT(*) FROM rtree_{layer}_geom")), features, "{layer}");
     }
-    assert_eq!(count(&dataset, "SELECT COUNT(*) FROM layer_styles"), 1);
+    assert_eq!(count(&dataset, "SELECT COUNT(*) FROM layer_styles"), 2);
+    assert_eq!(count(&dataset, "SELECT COUNT(*) FROM layer_styles WHERE useAsDefault"), 1);
     assert_eq!(count(&dataset, "SELECT COUNT(*) FROM grains WHERE fid <> grain_id"), 0);
     assert_eq!(count(&dataset, "SELECT COUNT(*) FROM grain_centres WHERE fid <> grain_id"), 0);
     let mut grains = dataset.layer_by_name("grains").expect("layer");

@@ -23,14 +23,14 @@ impl Fates {
             known[group] &= match kind {
                 Kind::Sheet => true,
                 Kind::Open => false,
-                Kind::Stone | Kind::Sand => whole[core] && joined.known[core],
+                Kind::Stone | Kind::Fragment => whole[core] && joined.known[core],
             };
             stone[group] |= matches!(kind, Kind::Stone | Kind::Open);
             bounds[group].merge(own);
         }
         let is_none = |group: usize| {
             let too_wide = max_grain_m > 0.0 && bounds[group].width_m() > max_grain_m;
-            // Sand that is not known to be joined to nothing may yet be part of a stone.
+            // A fragment that is not known to be joined to nothing may yet be part of a stone.
             too_wide || (!stone[group] && known[group])
         };
         let group = joined.root.iter().map(|&group| if is_none(group as usize) { NONE } else { group }).collect();

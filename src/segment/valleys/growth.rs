@@ -26,7 +26,7 @@ pub fn grow(ground: &Ground, cores: &[u32], kinds: &[Kind], settings: &ValleySet
         core => match kinds[core as usize] {
             Kind::Open => None,
             Kind::Stone => Some(0),
-            Kind::Sand | Kind::Sheet => Some(late),
+            Kind::Fragment | Kind::Sheet => Some(late),
         },
     };
     let doubtful = |v: usize| match cores[v] {

@@ -32,7 +32,7 @@ const INSIDE_EDGES: f64 = 1.5;
 /// there is loaded.
 pub fn join(ground: &Ground, cores: &[u32], judged: &[Judged], seen: &PlanBox, settings: &ValleySettings) -> Joined {
     let sure = Sure::of(ground, cores, seen);
-    let may = |core: usize| matches!(judged[core].kind, Kind::Stone | Kind::Sand | Kind::Open);
+    let may = |core: usize| matches!(judged[core].kind, Kind::Stone | Kind::Fragment | Kind::Open);
     let patches: Vec<Patch> = judged.par_iter().map(|core| Patch::of(ground, core)).collect();
     let farthest = |core: usize| reach_m(ground, judged[core].area_m2, settings);
     let mut order: Vec<usize> = (0..judged.len()).filter(|&core| may(core)).collect();
@@ -62,7 +62,7 @@ pub fn join(ground: &Ground, cores: &[u32], judged: &[Judged], seen: &PlanBox, s
                 if open(a) || open(b) {
                     return Some((a, b, None));
                 }
-                if [a, b].iter().all(|&core| judged[core].kind == Kind::Sand) {
+                if [a, b].iter().all(|&core| judged[core].kind == Kind::Fragment) {
                     return None;
                 }
                 let pair = [(&judged[a], &patches[a]), (&judged[b], &patches[b])];

@@ -1,4 +1,4 @@
-//! What a core is: a stone, or sand, or a sheet that no grain is part of.
+//! What a core is: a stone, a fragment that may be part of one, or a sheet that no grain is part of.
 
 use super::cores::{Cores, Ground};
 use crate::geometry::{DVec3, PlanBox, flatter_than, mean_depth};
@@ -10,9 +10,9 @@ use rayon::prelude::*;
 pub enum Kind {
     /// Part of a grain.
     Stone,
-    /// No grain by itself; but it may be part of one beside it.
-    Sand,
-    /// Part of no grain.
+    /// A low-scoring patch that stands on edge: no grain by itself, but it may be part of one.
+    Fragment,
+    /// Part of no grain: sand, a membrane, or too wide.
     Sheet,
     /// Not whole: not known.
     Open,
@@ -109,7 +109,7 @@ fn kind(ground: &Ground, vertices: &[u32], means: &Means, settings: &ValleySetti
     }
     match () {
         () if !flatter_than(&points, sphericity(settings.stone_score)) => Kind::Stone,
-        () if !flatter_than(&points, sphericity(PART)) => Kind::Sand,
+        () if !flatter_than(&points, sphericity(PART)) => Kind::Fragment,
         () => Kind::Sheet,
     }
 }

@@ -6,7 +6,7 @@
 //! | least curvature: where it is low, across a crease, is a valley | [`bend`] | one more ring |
 //! | seeds: what is further than `bridge_edges` from all valleys | [`cores`] | `bridge_edges`, and a seed |
 //! | cores: seeds take back what lies around them on their side of the valleys | [`cores`] | `refill_edges` |
-//! | what a core is: stone, sand, or a sheet | [`judge`] | a core |
+//! | what a core is: a stone, a fragment, or a sheet | [`mod@judge`] | a core |
 //! | growth up to the valley line, which is far where it is deep | [`growth`] | `growth_edges` |
 //! | cores of one stone joined, also across a gap | [`joins`] | `join_reach_edges`, and two cores |
 //! | grains: triangles by the majority of their vertices | [`settle`] | a grain |
