@@ -154,8 +154,8 @@ fn a_changed_setting_or_input_is_refused_by_name_and_nothing_is_touched() {
 fn a_run_along_valleys_that_is_killed_is_completed_with_the_same_bytes() {
     let scene = Scene::new();
     let valleys = ["--set", "segment.method=valleys"];
-    scene.finishes(&scene.path("whole"), &valleys);
-    let whole = results(&scene.path("whole"));
+    scene.finishes(&scene.path("along-valleys"), &valleys);
+    let whole = results(&scene.path("along-valleys"));
     assert!(whole != scene.whole);
     for (i, at) in ["ledger.after_write:1", "ledger.after_write:4", "ledger.after_sync:2"].into_iter().enumerate() {
         let out = scene.killed(&format!("killed-{i}"), at, &valleys);

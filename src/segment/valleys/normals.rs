@@ -3,7 +3,7 @@
 use super::neighbours::Neighbours;
 use crate::geometry::triangle_area;
 use crate::segment::bands::Bands;
-use glam::{DVec3, Vec3A};
+use glam::{DVec3, Vec3A, Vec4};
 use rayon::prelude::*;
 
 /// Normals and areas of the vertices of a tile.
@@ -37,20 +37,23 @@ impl Normals {
     /// What a vertex gets depends on as many rings of neighbours as there are passes.
     pub fn smooth(&mut self, neighbours: &Neighbours, passes: u32, crease: f32) {
         let sharpness = 1.0 / (crease * crease);
-        let mut next = vec![Vec3A::ZERO; self.unit.len()];
+        // Normal and area together: one place in memory for each neighbour.
+        let mut now: Vec<Vec4> = self.unit.iter().zip(&self.area_m2).map(|(n, &area)| n.extend(area)).collect();
+        let mut next = vec![Vec4::ZERO; now.len()];
         for _ in 0..passes {
-            let (unit, area) = (&self.unit, &self.area_m2);
             next.par_iter_mut().enumerate().with_min_len(1 << 12).for_each(|(v, next)| {
-                let own = unit[v];
-                let mut sum = own * area[v];
+                let area = now[v].w;
+                let own = Vec3A::from_vec4(now[v]);
+                let mut sum = own * area;
                 for &u in neighbours.around(v) {
-                    let other = unit[u as usize];
+                    let other = Vec3A::from_vec4(now[u as usize]);
                     let unlike = 1.0 + (other - own).length_squared() * sharpness;
-                    sum += other * (area[u as usize] / (unlike * unlike));
+                    sum += other * (now[u as usize].w / (unlike * unlike));
                 }
-                *next = sum.normalize_or_zero();
+                *next = sum.normalize_or_zero().extend(area);
             });
-            std::mem::swap(&mut self.unit, &mut next);
+            std::mem::swap(&mut now, &mut next);
         }
+        self.unit.par_iter_mut().zip(&now).for_each(|(unit, now)| *unit = Vec3A::from_vec4(*now));
     }
 }
