@@ -114,24 +114,40 @@ impl Patch {
         }
     }
 
-    /// How far each point lies from the nearest of another patch, m.
-    fn gaps_m(&self, other: &Patch) -> Vec<f64> {
-        let gap = |p: &DVec3| other.points.iter().map(|q| (*q - *p).length_squared()).fold(f64::INFINITY, f64::min);
-        self.points.iter().map(|p| gap(p).sqrt()).collect()
+    /// How far each point lies from the nearest of another patch, and each of that from the nearest of this one, m.
+    fn gaps_m(&self, other: &Patch) -> [Vec<f64>; 2] {
+        let mut theirs = vec![f64::INFINITY; other.points.len()];
+        let mut ours = Vec::with_capacity(self.points.len());
+        for p in &self.points {
+            let mut nearest = f64::INFINITY;
+            for (q, theirs) in other.points.iter().zip(&mut theirs) {
+                let squared = (*q - *p).length_squared();
+                nearest = nearest.min(squared);
+                *theirs = theirs.min(squared);
+            }
+            ours.push(nearest.sqrt());
+        }
+        theirs.iter_mut().for_each(|squared| *squared = squared.sqrt());
+        [ours, theirs]
     }
 
-    /// How steeply the points of another patch rise over the tangent planes of this one's points with a gap no wider, in
-    /// the mean: the sine; 0 for what lies below.
-    fn rise(&self, gaps_m: &[f64], widest_m: f64, other: &Patch) -> f64 {
-        let (mut sum, mut count) = (0.0, 0usize);
-        for ((p, normal), _) in self.points.iter().zip(&self.normals).zip(gaps_m).filter(|(_, gap)| **gap <= widest_m) {
+    /// Whether the points of another patch rise, in the mean, less steeply than `most` over the tangent planes of those of
+    /// this one's points that have a gap no wider: the mean of the sines, where what lies below counts 0.
+    fn rises_less(&self, gaps_m: &[f64], widest_m: f64, other: &Patch, most: f64) -> bool {
+        let near = || self.points.iter().zip(&self.normals).zip(gaps_m).filter(|(_, gap)| **gap <= widest_m);
+        // No term is below 0, so that what is too much can be told early.
+        let enough = most * (near().count() * other.points.len()) as f64;
+        let mut sum = 0.0;
+        for ((p, normal), _) in near() {
             for q in &other.points {
                 let way = *q - *p;
                 sum += (way.dot(*normal) / way.length().max(f64::MIN_POSITIVE)).max(0.0);
             }
-            count += other.points.len();
+            if sum >= enough {
+                return false;
+            }
         }
-        sum / count.max(1) as f64
+        sum < enough
     }
 }
 
@@ -144,7 +160,7 @@ fn one(
     (farthest_m, sure): (f64, &Sure),
     settings: &ValleySettings,
 ) -> Option<Option<bool>> {
-    let gaps_m = [a.gaps_m(b), b.gaps_m(a)];
+    let gaps_m = a.gaps_m(b);
     let gap_m = gaps_m[0].iter().copied().fold(f64::INFINITY, f64::min);
     if gap_m > farthest_m {
         return None;
@@ -152,8 +168,8 @@ fn one(
     let smaller_m2 = first.area_m2.min(second.area_m2);
     let rim_m = gap_m + RIM * smaller_m2.sqrt();
     for widest_m in [f64::INFINITY, rim_m] {
-        let rise = a.rise(&gaps_m[0], widest_m, b).max(b.rise(&gaps_m[1], widest_m, a));
-        if rise >= settings.join_rise {
+        let most = settings.join_rise;
+        if !a.rises_less(&gaps_m[0], widest_m, b, most) || !b.rises_less(&gaps_m[1], widest_m, a, most) {
             return Some(Some(false));
         }
     }

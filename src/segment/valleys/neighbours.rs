@@ -2,6 +2,7 @@
 
 use crate::segment::bands::Bands;
 use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 /// Vertices whose neighbours one thread gathers at a time.
@@ -71,71 +72,95 @@ struct InBand {
     at_mesh_edge: Vec<bool>,
 }
 
+/// Neighbours that find room at once; few vertices have more.
+const SLOTS: usize = 12;
+
+/// The first neighbours of a vertex, each once.
+#[derive(Clone, Copy)]
+struct Slots {
+    of: [u32; SLOTS],
+    count: u8,
+    /// A bit for each neighbour that only one triangle has named.
+    once: u16,
+}
+
+impl Slots {
+    const EMPTY: Slots = Slots { of: [u32::MAX; SLOTS], count: 0, once: 0 };
+
+    /// Adds a neighbour, and tells whether there was room.
+    #[inline]
+    fn add(&mut self, other: u32) -> bool {
+        // All at once, which takes no branches.
+        let known = self.of.iter().enumerate().fold(0u16, |known, (i, &slot)| known | u16::from(slot == other) << i);
+        if known != 0 {
+            self.once &= !known;
+            return true;
+        }
+        let place = usize::from(self.count);
+        if place < SLOTS {
+            self.of[place] = other;
+            self.count += 1;
+            self.once |= 1 << place;
+        }
+        place < SLOTS
+    }
+}
+
 impl InBand {
     fn of(bands: &Bands, vertices: Range<usize>) -> InBand {
         let place = |v: u32| (v as usize).wrapping_sub(vertices.start);
-        let blocks: Vec<&[[u32; 3]]> = bands.near(&vertices).map(|block| &bands.mesh.triangles[block]).collect();
-        // Two for each corner, of which most come twice.
-        let mut end = vec![0u32; vertices.len() + 1];
-        for &v in blocks.iter().flat_map(|block| block.as_flattened()) {
-            if place(v) < vertices.len() {
-                end[place(v)] += 2;
+        let mut slots = vec![Slots::EMPTY; vertices.len()];
+        let mut crowded = BTreeSet::new();
+        for &[a, b, c] in bands.near(&vertices).flat_map(|block| &bands.mesh.triangles[block]) {
+            for [v, next, other] in [[a, b, c], [b, c, a], [c, a, b]] {
+                if let Some(slots) = slots.get_mut(place(v)) {
+                    let room = (next == v || slots.add(next)) & (other == v || slots.add(other));
+                    if !room {
+                        crowded.insert(v);
+                    }
+                }
             }
         }
-        let mut total = 0;
-        for end in &mut end {
-            total += std::mem::replace(end, total);
-        }
-        let mut named = vec![0u32; total as usize];
-        for &[a, b, c] in blocks.iter().copied().flatten() {
-            for [v, next, other] in [[a, b, c], [b, c, a], [c, a, b]] {
-                if place(v) < vertices.len() {
-                    let at = end[place(v)] as usize;
-                    [named[at], named[at + 1]] = [next, other];
-                    end[place(v)] += 2;
+        let mut named: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        if !crowded.is_empty() {
+            for &[a, b, c] in bands.near(&vertices).flat_map(|block| &bands.mesh.triangles[block]) {
+                for [v, next, other] in [[a, b, c], [b, c, a], [c, a, b]] {
+                    if crowded.contains(&v) {
+                        named.entry(v).or_default().extend([next, other]);
+                    }
                 }
             }
         }
         let mut found = InBand {
             start: Vec::with_capacity(vertices.len()),
-            of: Vec::with_capacity(total as usize / 2 + vertices.len()),
+            of: Vec::with_capacity(7 * vertices.len()),
             at_mesh_edge: Vec::with_capacity(vertices.len()),
         };
-        let mut begin = 0;
-        for (v, &end) in vertices.clone().zip(&end) {
-            let at_mesh_edge = found.each_once(v as u32, &named[begin..end as usize]);
+        for (v, slots) in (vertices.start as u32..).zip(&slots) {
+            found.start.push(found.of.len() as u32);
+            let at_mesh_edge = match named.get(&v) {
+                None => {
+                    found.of.extend(&slots.of[..usize::from(slots.count)]);
+                    slots.once != 0
+                }
+                Some(named) => found.each_once(v, named),
+            };
             found.at_mesh_edge.push(at_mesh_edge);
-            begin = end as usize;
         }
         found
     }
 
-    /// Adds the neighbours of a vertex, each once, and tells whether one of them is named once only.
+    /// Adds the neighbours of a vertex that has many, each once, and tells whether one of them is named once only.
     fn each_once(&mut self, vertex: u32, named: &[u32]) -> bool {
-        let first = self.of.len();
-        self.start.push(first as u32);
-        // A bit for each neighbour that is named an odd number of times would miss a fork of three; more than once is
-        // enough here.
-        let mut once = 0u64;
-        let mut beyond = false;
+        let mut times: BTreeMap<u32, usize> = BTreeMap::new();
         for &other in named.iter().filter(|&&other| other != vertex) {
-            match self.of[first..].iter().position(|&known| known == other) {
-                Some(place) if place < 64 => once &= !(1 << place),
-                Some(_) => {}
-                None => {
-                    match self.of.len() - first {
-                        place @ 0..64 => once |= 1 << place,
-                        _ => beyond = true,
-                    }
-                    self.of.push(other);
-                }
+            let times = times.entry(other).or_default();
+            *times += 1;
+            if *times == 1 {
+                self.of.push(other);
             }
         }
-        if beyond {
-            let times = |other: &u32| named.iter().filter(|named| *named == other).count();
-            return self.of[first..].iter().any(|other| times(other) == 1);
-        }
-        once != 0
+        times.values().any(|&times| times == 1)
     }
 }
 

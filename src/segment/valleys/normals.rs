@@ -1,9 +1,8 @@
 //! Normals of the vertices, smoothed along the surface but not across creases.
 
 use super::neighbours::Neighbours;
-use crate::geometry::triangle_area;
 use crate::segment::bands::Bands;
-use glam::{DVec3, Vec3A, Vec4};
+use glam::{Vec3A, Vec4};
 use rayon::prelude::*;
 
 /// Normals and areas of the vertices of a tile.
@@ -18,17 +17,16 @@ impl Normals {
     /// Area-weighted normals of the vertices. Sums run by ascending triangle.
     pub fn of(bands: &Bands) -> Normals {
         let mesh = bands.mesh;
-        let mut sums = vec![(DVec3::ZERO, 0.0f64); mesh.positions.len()];
+        let mut sums = vec![Vec4::ZERO; mesh.positions.len()];
         let of = |t: usize| {
             let [a, b, c] = mesh.corners(t as u32);
-            Some(((b - a).cross(c - a), triangle_area([a, b, c])))
+            let normal = (b - a).as_vec3a().cross((c - a).as_vec3a());
+            // Half of its length is the area of the triangle.
+            Some(normal.extend(normal.length() / 6.0))
         };
-        bands.mark(&mut sums, of, |sum, (normal, area)| {
-            sum.0 += normal;
-            sum.1 += area / 3.0;
-        });
-        let unit = sums.par_iter().map(|(normal, _)| normal.normalize_or_zero().as_vec3a()).collect();
-        Normals { unit, area_m2: sums.par_iter().map(|(_, area)| *area as f32).collect() }
+        bands.mark(&mut sums, of, |sum, normal_and_area| *sum += normal_and_area);
+        let unit = sums.par_iter().map(|sum| Vec3A::from_vec4(*sum).normalize_or_zero()).collect();
+        Normals { unit, area_m2: sums.par_iter().map(|sum| sum.w).collect() }
     }
 
     /// Takes the mean over each vertex and its neighbours, so many times, weighted by area and by how alike the
