@@ -10,7 +10,7 @@ use crate::tile::{CoreSize, NormalField, Plan, TileMesh};
 /// smaller ones halos weigh more.
 const LARGEST_CURVATURE_CORE: f64 = 5e5;
 /// Largest core of the grain pass, triangles: what a crash can cost, and with its halos what local numbers can hold.
-pub(crate) const LARGEST_CORE: f64 = 5e7;
+pub(crate) const LARGEST_CORE: f64 = 6e7;
 /// Triangles of a core of the grain pass with its halos, for each of the core, where nothing is known of the grains.
 const WITH_WIDE_HALO: f64 = 1.6;
 /// Share of the memory that the tiles of a survey that is cut are made for: the rest is for second looks, for what was
@@ -129,7 +129,7 @@ mod tests {
         assert_eq!(cuts(14_000_000, 2, GIB), Cuts { least: 1.0, divisible: false });
         assert_eq!(cuts(0, 8, GIB), Cuts { least: 1.0, divisible: false });
         // However much memory there is, a tile's numbers and what a crash may cost are bounded.
-        assert_eq!(cuts(2_000_000_000, 1, 1000 * GIB).least, 40.0);
+        assert!((cuts(2_000_000_000, 1, 1000 * GIB).least - 33.3).abs() < 0.1);
         for (triangles, threads, memory) in [(100_000_000, 2, GIB), (100_000_000, 64, 8 * GIB), (15_000_000, 1, GIB)] {
             let tile = triangles as f64 / cuts(triangles, threads, memory).least;
             let at_once = tiles_at_once(threads) as u64;
