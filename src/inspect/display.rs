@@ -77,6 +77,20 @@ fn write_survey(f: &mut Formatter<'_>, survey: &SurveyFigures, files: usize) -> 
     row(f, "preset", format!("--config {}{coarse}", s.preset.name()))?;
     let limits = format!("--min-grain-area {:e} --max-grain {}", s.min_grain_area_m2, s.max_grain_m);
     row(f, "suggested limits", limits)?;
+    let l = &s.lengths;
+    row(f, "stones divided", format!("by creases sharper than a radius of {}", length(l.bluntest_valley_m)))?;
+    row(f, "bridges cut", format!("up to a width of {}", length(l.widest_bridge_m)))?;
+    row(f, "taken for noise", format!("what is finer than {}", length(l.smoothed_m)))?;
+    row(
+        f,
+        "growth, gaps",
+        format!("{} into valleys; patches up to {} apart", length(l.growth_m), length(l.widest_gap_m)),
+    )?;
+    row(
+        f,
+        "why these",
+        "all are multiples of the mean edge (keys of [valleys]); sharp and smooth meshes take the same",
+    )?;
     let needs = &survey.needs;
     let least = format!("at least {}", bytes(needs.least_memory_bytes));
     row(f, "memory", format!("{least}; with {} it is worked in one piece", bytes(needs.whole_memory_bytes)))?;

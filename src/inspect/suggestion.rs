@@ -5,7 +5,7 @@
 //! most likely made from a laser scan.
 
 use super::SurfaceFigures;
-use crate::settings::Settings;
+use crate::settings::{Settings, ValleySettings};
 use serde::Serialize;
 use std::f64::consts::PI;
 use std::path::Path;
@@ -72,6 +72,37 @@ pub struct Suggestion {
     pub max_grain_m: f64,
     /// Whether the mean edge is above 30 mm, so that only boulders can be told apart.
     pub coarse: bool,
+    /// What the lengths of the default method come to.
+    pub lengths: ValleyLengths,
+}
+
+/// What the settings of `[valleys]`, which are multiples of the mean edge, come to in a survey.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ValleyLengths {
+    /// Radius of the bluntest crease that divides stones, metres.
+    pub bluntest_valley_m: f64,
+    /// Width of the widest bridge between stones that is cut, metres.
+    pub widest_bridge_m: f64,
+    /// Width over which normals are smoothed, metres: what is finer is taken for noise.
+    pub smoothed_m: f64,
+    /// How far stones grow into the valleys around them, metres.
+    pub growth_m: f64,
+    /// Widest gap between patches of one stone, metres.
+    pub widest_gap_m: f64,
+}
+
+impl ValleyLengths {
+    fn new(mean_edge_m: f64) -> ValleyLengths {
+        let v = ValleySettings::default();
+        ValleyLengths {
+            bluntest_valley_m: mean_edge_m / v.valley_depth,
+            widest_bridge_m: 2.0 * v.bridge_edges * mean_edge_m,
+            // Each pass is a step of about one edge to a random side.
+            smoothed_m: 2.0 * f64::from(v.normal_passes).sqrt() * mean_edge_m,
+            growth_m: v.growth_edges * mean_edge_m,
+            widest_gap_m: v.join_reach_edges * mean_edge_m,
+        }
+    }
 }
 
 impl Suggestion {
@@ -86,6 +117,7 @@ impl Suggestion {
             min_grain_area_m2: round_up(area),
             max_grain_m: preset.max_grain_m(),
             coarse: surface.mean_edge_m > 0.030,
+            lengths: ValleyLengths::new(surface.mean_edge_m),
         }
     }
 }

@@ -111,12 +111,14 @@ impl InBand {
         let place = |v: u32| (v as usize).wrapping_sub(vertices.start);
         let mut slots = vec![Slots::EMPTY; vertices.len()];
         let mut crowded = BTreeSet::new();
-        for &[a, b, c] in bands.near(&vertices).flat_map(|block| &bands.mesh.triangles[block]) {
-            for [v, next, other] in [[a, b, c], [b, c, a], [c, a, b]] {
-                if let Some(slots) = slots.get_mut(place(v)) {
-                    let room = (next == v || slots.add(next)) & (other == v || slots.add(other));
-                    if !room {
-                        crowded.insert(v);
+        for block in bands.near(&vertices) {
+            for &[a, b, c] in &bands.mesh.triangles[block] {
+                for [v, next, other] in [[a, b, c], [b, c, a], [c, a, b]] {
+                    if let Some(slots) = slots.get_mut(place(v)) {
+                        let room = (next == v || slots.add(next)) & (other == v || slots.add(other));
+                        if !room {
+                            crowded.insert(v);
+                        }
                     }
                 }
             }
