@@ -55,7 +55,7 @@ pub fn flatter_than(points: &[DVec3], threshold: f64) -> bool {
     hull(points).is_some_and(|exact| sphericity(exact.volume_m3, exact.area_m2) < threshold)
 }
 
-/// The planes that touch the convex hull of some points in [`PAIRS_FOR_DEPTH`] pairs of directions.
+/// Planes that touch the convex hull of some points, in 200 directions.
 #[derive(Debug, Clone)]
 pub struct Supports {
     origin: DVec3,
