@@ -32,6 +32,8 @@ pub struct Completed {
 const CELLS: f64 = 8.0;
 /// Share of the vertices that is left out at either end of an axis when its width is taken.
 const TRIMMED: f64 = 0.01;
+/// Part of the width at either end in which the outermost vertices are mostly found.
+const END: f64 = 0.15;
 /// A fit of nine numbers wants more points than these.
 const FEWEST_POINTS: usize = 10;
 /// Error of c per root mean squared distance of the visible surface from the body: with 2, about 68 % of the
@@ -107,13 +109,20 @@ impl Along {
 
     /// Width along a and b, without the outermost vertices.
     fn widths(&self) -> [f64; 2] {
-        let last = self.points.len() - 1;
-        let left_out = (TRIMMED * last as f64) as usize;
+        let left_out = (TRIMMED * (self.points.len() - 1) as f64) as usize;
         [0, 1].map(|k| {
-            let mut along: Vec<f64> = self.points.iter().map(|p| p[k]).collect();
-            let low = *along.select_nth_unstable_by(left_out, f64::total_cmp).1;
-            let high = *along.select_nth_unstable_by(last - left_out, f64::total_cmp).1;
-            high - low
+            let (low, high) = (self.low[k], self.high[k]);
+            let inward = |outermost: f64, sign: f64| {
+                let depth = |p: &DVec3| sign * (p[k] - outermost);
+                // Those near the end suffice, if they are enough.
+                let near = END * (high - low);
+                let mut depths: Vec<f64> = self.points.iter().map(depth).filter(|depth| *depth <= near).collect();
+                if depths.len() <= left_out {
+                    depths = self.points.iter().map(depth).collect();
+                }
+                *depths.select_nth_unstable_by(left_out, f64::total_cmp).1
+            };
+            (high - low) - inward(low, 1.0) - inward(high, -1.0)
         })
     }
 
