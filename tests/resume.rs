@@ -157,7 +157,7 @@ fn a_run_along_valleys_that_is_killed_is_completed_with_the_same_bytes() {
     scene.finishes(&scene.path("along-valleys"), &valleys);
     let whole = results(&scene.path("along-valleys"));
     assert!(whole != scene.whole);
-    for (i, at) in ["ledger.after_write:1", "ledger.after_write:4", "ledger.after_sync:2"].into_iter().enumerate() {
+    for (i, at) in ["ledger.after_write:1", "ledger.after_write:4", "ledger.after_sync:1"].into_iter().enumerate() {
         let out = scene.killed(&format!("killed-{i}"), at, &valleys);
         assert!(results(&out).is_empty(), "{at}");
         let said = said(scene.run(&out, &valleys).arg("--resume"));
