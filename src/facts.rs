@@ -17,6 +17,7 @@ const EDGE_SHARE: f64 = 0.9;
 /// What is odd about a result without being wrong, each with what to do.
 pub fn oddities(catalogue: &Catalogue, scale: &Scale, settings: &Settings) -> Vec<String> {
     let mut odd = Vec::new();
+    let wider = catalogue.oversize.len();
     // Of a closed or open surface there are two triangles for each vertex; of loose ones, a third.
     if scale.vertices as f64 > 3.0 * LOOSE_SHARE * scale.triangles as f64 {
         odd.push(format!(
@@ -25,12 +26,12 @@ pub fn oddities(catalogue: &Catalogue, scale: &Scale, settings: &Settings) -> Ve
         ));
     } else if catalogue.grains.is_empty() {
         odd.push(format!(
-            "no grain was found among {} triangles with a mean edge of {:.3e} m, a smallest grain of {:.3e} m² and a widest of {} m ({} wider bodies)\nhelp: `gravelometer inspect` says what the survey can show; look at --unit, --min-grain-area and --max-grain",
+            "no grain was found among {} triangles with a mean edge of {:.3e} m, a smallest grain of {:.3e} m² and a widest of {} m{}\nhelp: `gravelometer inspect` says what the survey can show; look at --unit, --min-grain-area and --max-grain",
             scale.triangles,
             scale.mean_edge_m,
             settings.segment.min_grain_area_m2,
             settings.segment.max_grain_m,
-            catalogue.oversize.len()
+            if wider > 0 { format!(" ({wider} wider bodies)") } else { String::new() }
         ));
     }
     let at_edges = catalogue.grains.iter().filter(|g| g.grain.touches_edge).count();

@@ -45,6 +45,13 @@ fn all_hows() -> Vec<How> {
         how("no joins, no growth", |_, v| (v.join_reach, v.growth_edges) = (0.0, 0.0)),
         how("everything is a stone", |_, v| v.stone_score = -10.0),
         how("most is sand", |_, v| v.stone_score = 1.4),
+        how("sand starts very late", |s, v| {
+            (v.sand_delay_edges, v.growth_edges, v.join_reach, v.join_rise) = (8.0, 10.0, 0.6, 0.3);
+            (s.min_grain_triangles, v.stone_score) = (12.0, 1.1);
+        }),
+        how("sand never starts, nothing smoothed", |_, v| {
+            (v.sand_delay_edges, v.growth_edges, v.normal_passes, v.stone_score) = (9.0, 3.0, 0, 1.0);
+        }),
         how("narrow grains", |s, _| s.max_grain_m = 0.3),
         how("no limit", |s, _| s.max_grain_m = 0.0),
         how("tiny seeds, plain smoothing", |s, v| {
@@ -142,7 +149,7 @@ fn what_a_tile_with_a_thin_halo_publishes_is_true_and_what_it_does_not_is_named(
         }
     }
     println!(
-        "{settled} of 900 tiles settled, with {owned} grains; in the others {early} are found at once, {later_on} not"
+        "{settled} of 1080 tiles settled, with {owned} grains; in the others {early} are found at once, {later_on} not"
     );
     assert!(settled > 50 && owned > 20 && early > 30 && later_on > 50, "{settled} {owned} {early} {later_on}");
 }

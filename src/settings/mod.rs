@@ -144,7 +144,7 @@ pub enum ConcaveRule {
 pub struct SegmentSettings {
     /// How stones are told apart.
     pub method: Method,
-    /// Widest grain, metres (longer side of its box in plan); 0 for no limit. Wider bodies are no
+    /// Widest grain, metres (longer side of its box in plan, before it grows into valleys); 0 for no limit. Wider bodies are no
     /// grains; the published method reports them as oversize. Decides how far a tile must look beyond its core.
     pub max_grain_m: f64,
     /// Smallest grain, m² of visible surface.

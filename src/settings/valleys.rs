@@ -18,7 +18,7 @@ pub struct ValleySettings {
     pub valley_depth: f64,
     /// Bridges between stones narrower than twice this are cut, mean edge lengths, 0 to 10.
     pub bridge_edges: f64,
-    /// Smallest seed of a stone, as a share of the smallest grain, 0 to 1: less finds small exposures, and more noise.
+    /// Smallest seed of a stone, as a share of the smallest grain, 0.01 to 1: less finds small exposures, and more noise.
     pub seed_share: f64,
     /// How far a seed takes back what was cut off around it, mean edge lengths, 0 to 50.
     pub refill_edges: f64,
@@ -95,7 +95,7 @@ impl ValleySettings {
             crease 0.05 10.0;
             valley_depth 0.01 0.5;
             bridge_edges 0.0 10.0;
-            seed_share 0.0 1.0;
+            seed_share 0.01 1.0;
             refill_edges 0.0 50.0;
             growth_edges 0.0 50.0;
             valley_cost 0.0 100.0;

@@ -28,8 +28,8 @@ pub struct TileFinding {
     pub report: TileReport,
 }
 
-/// Leaves out the grains of which the method is less sure than `least`, and gives how many; those whose method does not tell
-/// stay.
+/// Leaves out the grains of which the method is less sure than `least`, and gives how many; those of which it does not
+/// tell stay.
 pub fn leave_out(findings: &mut [TileFinding], least: f64) -> u64 {
     let mut left_out = 0;
     for finding in findings {

@@ -37,7 +37,8 @@ impl Ground<'_> {
         f64::from(self.bends[v].least) < -settings.valley_depth || self.bends[v].gap
     }
 
-    fn is_unknown(&self, v: usize) -> bool {
+    /// Whether the bending of a vertex is not known.
+    pub fn is_unknown(&self, v: usize) -> bool {
         self.unknown.is_some_and(|unknown| unknown[v])
     }
 

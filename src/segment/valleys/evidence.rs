@@ -58,7 +58,7 @@ pub fn evidence(ground: &Ground, grown: &[u32], judged: &[Judged], fates: &Fates
         rim_bend: over(s.bend, s.rim as f64),
         free_rim: over(s.free as f64, s.rim as f64),
         roundness: over(s.mean, s.area_m2) / ground.mean_edge_m * s.area_m2.sqrt(),
-        core_share: over(s.core_m2, s.area_m2),
+        core_share: over(s.core_m2, s.area_m2).min(1.0),
         patches: s.cores,
     };
     sums.into_iter().map(tell).collect()

@@ -11,8 +11,6 @@ use rayon::prelude::*;
 pub const PARTS: f64 = 256.0;
 /// Further than any reach.
 pub const FAR: u16 = u16::MAX;
-/// The longest reach, in mean edge lengths.
-pub const LONGEST: f64 = 100.0;
 /// Vertices that one thread floods at a time.
 const BAND: usize = if cfg!(test) { 16 } else { 1 << 16 };
 

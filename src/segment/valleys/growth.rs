@@ -14,13 +14,18 @@ use crate::settings::ValleySettings;
 pub fn grow(ground: &Ground, cores: &[u32], kinds: &[Kind], settings: &ValleySettings) -> Vec<u32> {
     let slowness: Vec<f32> = (0..cores.len())
         .map(|v| {
+            // What is not known is taken for as fast as can be: what is in doubt must not come later than it might.
+            if ground.is_unknown(v) {
+                return 1.0;
+            }
             let valley = settings.valley_cost * f64::from(-ground.bends[v].least).max(0.0);
             let down = settings.overhang_cost * f64::from(-ground.normals[v].z).max(0.0);
             (1.0 + valley + down) as f32
         })
         .collect();
     let uphill = |a: usize, b: usize| Some(parts(ground.edges(a, b) * 0.5 * f64::from(slowness[a] + slowness[b])));
-    let late = parts(settings.sand_delay_edges) as u16;
+    let reach = parts(settings.growth_edges) as u16;
+    let late = (parts(settings.sand_delay_edges) as u16).min(reach);
     let start = |v: usize| match cores[v] {
         core if core >= UNKNOWN => None,
         core => match kinds[core as usize] {
@@ -34,5 +39,5 @@ pub fn grow(ground: &Ground, cores: &[u32], kinds: &[Kind], settings: &ValleySet
         NONE => false,
         core => kinds[core as usize] == Kind::Open,
     };
-    spread(ground, (&start, &doubtful, &|v| cores[v]), parts(settings.growth_edges) as u16, uphill)
+    spread(ground, (&start, &doubtful, &|v| cores[v]), reach, uphill)
 }

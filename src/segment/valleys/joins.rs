@@ -32,6 +32,7 @@ const INSIDE_EDGES: f64 = 1.5;
 /// there is loaded.
 pub fn join(ground: &Ground, cores: &[u32], judged: &[Judged], seen: &PlanBox, settings: &ValleySettings) -> Joined {
     let sure = Sure::of(ground, cores, seen);
+    let blocks = Blocks::of(ground, judged);
     let may = |core: usize| matches!(judged[core].kind, Kind::Stone | Kind::Fragment | Kind::Open);
     let patches: Vec<Patch> = judged.par_iter().map(|core| Patch::of(ground, core)).collect();
     let farthest = |core: usize| reach_m(ground, judged[core].area_m2, settings);
@@ -45,7 +46,7 @@ pub fn join(ground: &Ground, cores: &[u32], judged: &[Judged], seen: &PlanBox, s
             let ahead = order[place + 1..]
                 .iter()
                 .take_while(move |&&other| judged[other].bounds.min[0] <= judged[first].bounds.max[0] + widest_m);
-            let (patches, sure, farthest) = (&patches, &sure, &farthest);
+            let (patches, sure, farthest, blocks) = (&patches, &sure, &farthest, &blocks);
             ahead.filter_map(move |&other| {
                 let (a, b) = (first.min(other), first.max(other));
                 // Of a core that is not whole the reach is not known, but it is not more than that of the other.
@@ -66,7 +67,7 @@ pub fn join(ground: &Ground, cores: &[u32], judged: &[Judged], seen: &PlanBox, s
                     return None;
                 }
                 let pair = [(&judged[a], &patches[a]), (&judged[b], &patches[b])];
-                one(ground, (judged, [a, b]), pair, (gap_m, sure), settings).map(|one| (a, b, one))
+                one(ground, (blocks, [a, b]), pair, (gap_m, sure), settings).map(|one| (a, b, one))
             })
         })
         .collect();
@@ -155,7 +156,7 @@ impl Patch {
 #[allow(clippy::type_complexity, reason = "each is named where it is used")]
 fn one(
     ground: &Ground,
-    (judged, names): (&[Judged], [usize; 2]),
+    (blocks, names): (&Blocks, [usize; 2]),
     [(first, a), (second, b)]: [(&Judged, &Patch); 2],
     (farthest_m, sure): (f64, &Sure),
     settings: &ValleySettings,
@@ -181,14 +182,53 @@ fn one(
     }
     let hull = Supports::of(&both);
     let mut swallowed = ExactSum::ZERO;
-    let beside = |(name, other): &(usize, &Judged)| !names.contains(name) && apart(&other.bounds, &bounds) == 0.0;
-    for v in judged.iter().enumerate().filter(beside).flat_map(|(_, other)| &other.vertices).map(|&v| v as usize) {
-        let p = ground.positions[v];
+    for v in blocks.near(&bounds).filter(|block| !names.contains(&block.core)).flat_map(|block| block.vertices) {
+        let p = ground.positions[*v as usize];
         if bounds.margin_m(p) >= 0.0 && hull.depth(p) > INSIDE_EDGES * ground.mean_edge_m {
-            swallowed.add(f64::from(ground.area_m2[v]));
+            swallowed.add(f64::from(ground.area_m2[*v as usize]));
         }
     }
     Some(Some(swallowed.value() < settings.join_swallowed * smaller_m2))
+}
+
+/// The vertices of all cores in blocks that are small, also those of sheets as wide as the tile.
+struct Blocks<'j> {
+    /// By the western side of their boxes, ascending.
+    all: Vec<Block<'j>>,
+    widest_m: f64,
+}
+
+/// Some vertices of a core that follow one another, and their box in plan.
+struct Block<'j> {
+    core: usize,
+    vertices: &'j [u32],
+    bounds: PlanBox,
+}
+
+/// Vertices of a block.
+const BLOCK: usize = 256;
+
+impl<'j> Blocks<'j> {
+    fn of(ground: &Ground, judged: &'j [Judged]) -> Blocks<'j> {
+        let of_core = |(core, judged): (usize, &'j Judged)| {
+            judged.vertices.chunks(BLOCK).map(move |vertices| {
+                let mut bounds = PlanBox::EMPTY;
+                vertices.iter().for_each(|&v| bounds.include(ground.positions[v as usize]));
+                Block { core, vertices, bounds }
+            })
+        };
+        let mut all: Vec<Block> = judged.iter().enumerate().flat_map(of_core).collect();
+        all.sort_by(|a, b| a.bounds.min[0].total_cmp(&b.bounds.min[0]));
+        let widest_m = all.iter().map(|block| block.bounds.width_m()).fold(0.0, f64::max);
+        Blocks { all, widest_m }
+    }
+
+    /// Blocks that may reach into a box, in no order that matters.
+    fn near<'b>(&'b self, bounds: &'b PlanBox) -> impl Iterator<Item = &'b Block<'j>> {
+        let first = self.all.partition_point(|block| block.bounds.min[0] < bounds.min[0] - self.widest_m);
+        let ahead = self.all[first..].iter().take_while(|block| block.bounds.min[0] <= bounds.max[0]);
+        ahead.filter(|block| apart(&block.bounds, bounds) == 0.0)
+    }
 }
 
 /// Where everything is known.

@@ -67,10 +67,23 @@ pub fn segment_along_valleys(
     let kinds: Vec<Kind> = judged.iter().map(|core| core.kind).collect();
     let grown = grow(&ground, &cores.of, &kinds, settings);
     let joined = join(&ground, &cores.of, &judged, mesh.seen.as_ref().unwrap_or(&PlanBox::EVERYWHERE), settings);
-    let whole = beside_unknown(&surface.neighbours, &grown, judged.len()).into_iter().map(|open| !open).collect();
+    let whole = whole(&surface.neighbours, &cores, &grown);
     let fates = Fates::of(&judged, &joined, whole, segment.max_grain_m);
     let evidence = evidence(&ground, &grown, &judged, &fates);
     settle::settle(mesh, &surface.neighbours, &grown, (&fates, &evidence), &Sizes::new(scale, segment))
+}
+
+/// Of which cores nothing that belongs to them, or grew from them, is unknown or lies beside what is.
+fn whole(neighbours: &Neighbours, cores: &Cores, grown: &[u32]) -> Vec<bool> {
+    let mut whole: Vec<bool> =
+        beside_unknown(neighbours, grown, cores.count()).into_iter().map(|beside| !beside).collect();
+    // What starts late may have lost its own vertices to what is in doubt, so that none is left to lie beside it.
+    for (&core, &grown) in cores.of.iter().zip(grown) {
+        if core < UNKNOWN && grown == UNKNOWN {
+            whole[core as usize] = false;
+        }
+    }
+    whole
 }
 
 /// What the surface is like at every vertex.
