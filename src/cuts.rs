@@ -15,7 +15,7 @@ pub(crate) const LARGEST_CORE: f64 = 6e7;
 const WITH_WIDE_HALO: f64 = 1.6;
 /// Share of the memory that the tiles of a survey that is cut are made for: the rest is for second looks, for what was
 /// found, and for what the allocator keeps. So peaks are alike for surveys of all sizes.
-const SHARE_OF_CUT: f64 = 0.875;
+const SHARE_OF_CUT: f64 = 0.8;
 /// Triangles of a curvature core with its halo, for each of the core.
 const WITH_HALO: f64 = 1.1;
 /// Widths of a grain that are worked once more along a border between two cores, halos and second looks together.
