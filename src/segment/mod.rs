@@ -1,7 +1,7 @@
 //! Segmentation: which triangles of a tile form which grain, and what of that is certain.
 //!
-//! The published recipe (Rheinwalt, Purinton & Bookhagen 2025), each step a function of the surface and
-//! of the survey's scale only:
+//! Two methods, by `segment.method`: the default is in `valleys`; the other files are the published recipe (Rheinwalt,
+//! Purinton & Bookhagen 2025), each step a function of the surface and of the survey's scale only:
 //!
 //! | step | file | looks around |
 //! |---|---|---|
