@@ -12,8 +12,8 @@ use crate::store::StoreError;
 /// Counted, for half as many vertices as triangles: positions 12, corners 12, complete 0.5, in_core 1, the divergence
 /// of the vertices 4, neighbours 12; states and labels 5, components while they are numbered 8, vertices of bodies 6; or
 /// instead of the last three colours 6, triangles of grains 4 and what is measured; makes 60. Along
-/// valleys instead of the divergence and what follows: neighbours of the vertices 14, normals, bends and areas 16, floods and
-/// labels 11; makes 67. Measured with 10 million in one tile: 68, and 78 along valleys. Something for growth comes on top;
+/// valleys instead of the divergence and what follows: neighbours of the vertices 17, normals, bends and areas 16, floods and
+/// labels 11; makes 70. Measured with 10 million in one tile: 68, and 74 along valleys. Something for growth comes on top;
 /// unknown triangles take up to 18 more each.
 pub const BYTES_PER_TRIANGLE: u64 = 82;
 

@@ -1,9 +1,10 @@
 //! How the surface bends at each vertex, from the normals around it.
 
+use super::lanes::{self, Lanes};
 use super::neighbours::Neighbours;
 use super::normals::Normals;
 use crate::geometry::DVec3;
-use glam::Vec3A;
+use glam::{Vec3A, Vec4};
 use rayon::prelude::*;
 
 /// Bending at a vertex, as a share of 1 over the mean edge length; above 0 on a stone's top, below in a valley.
@@ -29,13 +30,16 @@ pub fn bends(positions: &[DVec3], neighbours: &Neighbours, normals: &Normals, me
         let normal = normals.unit[v];
         let [east, north] = tangents(normal);
         let mut fit = Fit::default();
-        let mut longest = 0.0f32;
-        for &u in neighbours.around(v) {
-            let edge = (positions[u as usize] - positions[v]).as_vec3a();
-            longest = longest.max(edge.length_squared());
-            let change = normals.unit[u as usize] - normal;
-            fit.add([edge.dot(east), edge.dot(north)], [change.dot(east), change.dot(north)]);
-        }
+        let mut longest = Vec4::ZERO;
+        neighbours.each_four(v, |four| {
+            // Where the ring is filled up the vertex itself stands in: an edge of no length.
+            let four = four.map(|u| if (u as usize) < positions.len() { u as usize } else { v });
+            let edges = Lanes::of(four.map(|u| (positions[u] - positions[v]).as_vec3a().extend(0.0)));
+            let changes = Lanes::of(four.map(|u| (normals.unit[u] - normal).extend(0.0)));
+            longest = longest.max(edges.lengths_squared());
+            fit.add([edges.dot(east), edges.dot(north)], [changes.dot(east), changes.dot(north)]);
+        });
+        let longest = longest.max_element();
         let unit = mean_edge_m as f32;
         let gap = longest > (GAP_EDGES * GAP_EDGES) as f32 * unit * unit;
         let [least, mean] = fit.curvatures().unwrap_or_default();
@@ -54,14 +58,16 @@ fn tangents(normal: Vec3A) -> [Vec3A; 2] {
 /// Normal equations of a symmetric matrix that maps edges to changes of the normal.
 #[derive(Default)]
 struct Fit {
-    xx: f32,
-    xy: f32,
-    yy: f32,
-    by: [f32; 3],
+    xx: Vec4,
+    xy: Vec4,
+    yy: Vec4,
+    by: [Vec4; 3],
 }
 
 impl Fit {
-    fn add(&mut self, [x, y]: [f32; 2], [change_x, change_y]: [f32; 2]) {
+    /// Adds four edges, each in a lane. An edge of no length adds nothing.
+    #[inline]
+    fn add(&mut self, [x, y]: [Vec4; 2], [change_x, change_y]: [Vec4; 2]) {
         self.xx += x * x;
         self.xy += x * y;
         self.yy += y * y;
@@ -72,7 +78,8 @@ impl Fit {
 
     /// Least and mean curvature, 1/m; none where the edges lie in a line.
     fn curvatures(&self) -> Option<[f32; 2]> {
-        let Fit { xx, xy, yy, by: [p, q, r] } = *self;
+        let [xx, xy, yy] = [self.xx, self.xy, self.yy].map(lanes::sum);
+        let [p, q, r] = self.by.map(lanes::sum);
         let both = xx + yy;
         // Minors of [[xx, xy, 0], [xy, xx + yy, xy], [0, xy, yy]].
         let [first, second] = [both * yy - xy * xy, xy * yy];

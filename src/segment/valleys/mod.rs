@@ -26,6 +26,7 @@ pub mod flood;
 pub mod growth;
 pub mod joins;
 pub mod judge;
+mod lanes;
 pub mod neighbours;
 pub mod normals;
 pub mod settle;

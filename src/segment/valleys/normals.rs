@@ -1,5 +1,6 @@
 //! Normals of the vertices, smoothed along the surface but not across creases.
 
+use super::lanes::{self, Lanes};
 use super::neighbours::Neighbours;
 use crate::segment::bands::Bands;
 use glam::{Vec3A, Vec4};
@@ -37,21 +38,33 @@ impl Normals {
         let sharpness = 1.0 / (crease * crease);
         // Normal and area together: one place in memory for each neighbour.
         let mut now: Vec<Vec4> = self.unit.iter().zip(&self.area_m2).map(|(n, &area)| n.extend(area)).collect();
+        let vertices = now.len();
+        // Where a ring of neighbours is filled up there is nothing, which weighs nothing.
+        now.push(Vec4::ZERO);
         let mut next = vec![Vec4::ZERO; now.len()];
         for _ in 0..passes {
-            next.par_iter_mut().enumerate().with_min_len(1 << 12).for_each(|(v, next)| {
-                let area = now[v].w;
-                let own = Vec3A::from_vec4(now[v]);
-                let mut sum = own * area;
-                for &u in neighbours.around(v) {
-                    let other = Vec3A::from_vec4(now[u as usize]);
-                    let unlike = 1.0 + (other - own).length_squared() * sharpness;
-                    sum += other * (now[u as usize].w / (unlike * unlike));
-                }
-                *next = sum.normalize_or_zero().extend(area);
+            next[..vertices].par_iter_mut().enumerate().with_min_len(1 << 12).for_each(|(v, next)| {
+                *next = mean_around(&now, v, neighbours, sharpness);
             });
             std::mem::swap(&mut now, &mut next);
         }
         self.unit.par_iter_mut().zip(&now).for_each(|(unit, now)| *unit = Vec3A::from_vec4(*now));
     }
+}
+
+/// The mean normal of a vertex and its neighbours, with the vertex's own area. All are given with their areas, and
+/// behind the last vertex nothing.
+#[inline]
+fn mean_around(normals: &[Vec4], v: usize, neighbours: &Neighbours, sharpness: f32) -> Vec4 {
+    let own = normals[v];
+    let mut sums = [Vec4::ZERO; 3];
+    neighbours.each_four(v, |four| {
+        let Lanes { x, y, z, w: area } = Lanes::of(four.map(|u| normals[u as usize]));
+        let [across, along, up] = [x - own.x, y - own.y, z - own.z];
+        let unlike = Vec4::ONE + (across * across + along * along + up * up) * sharpness;
+        let weight = area / (unlike * unlike);
+        sums = [sums[0] + x * weight, sums[1] + y * weight, sums[2] + z * weight];
+    });
+    let mean = Vec3A::from_vec4(own) * own.w + Vec3A::from_array(sums.map(lanes::sum));
+    mean.normalize_or_zero().extend(own.w)
 }
