@@ -245,8 +245,10 @@ fn older_results_are_touched_by_force_only_and_by_complete_results_only() {
     assert_eq!(run(&mesh, &out, &["--labelled-mesh"]).code, 0);
     let notes = out.join("notes.txt");
     std::fs::write(&notes, "mine").unwrap();
+    let scores = out.join("validation.json");
+    std::fs::write(&scores, "of these results").unwrap();
     let before = contents(&out);
-    assert_eq!(before.len(), 7, "{:?}", before.keys());
+    assert_eq!(before.len(), 8, "{:?}", before.keys());
     run(&mesh, &out, &[]).fails(1, &["holds files already", "--force", "\nhelp: "]);
     assert!(contents(&out) == before, "a refused run changed the folder");
     let damaged = folder.path().join("damaged.ply");
@@ -258,6 +260,7 @@ fn older_results_are_touched_by_force_only_and_by_complete_results_only() {
     let after = contents(&out);
     assert!(after[&out.join("grain_size.tif")] != before[&out.join("grain_size.tif")], "nothing was replaced");
     assert!(!after.contains_key(&out.join("labelled_mesh.ply")), "an older result was left among new ones");
+    assert!(!after.contains_key(&scores), "scores of older results were left among new ones");
     assert_eq!(after[&notes], b"mine");
 }
 

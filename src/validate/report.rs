@@ -13,8 +13,8 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// Names of the results in the folder of a run.
-const SCORES: &str = "validation.json";
-const PICTURE: &str = "validation.png";
+const SCORES: &str = crate::write::SCORES[0];
+const PICTURE: &str = crate::write::SCORES[1];
 
 /// What to validate.
 #[derive(Debug, Clone, Default)]

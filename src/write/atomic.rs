@@ -16,6 +16,10 @@ pub const REPORT: &str = "run.json";
 pub const OUTPUTS: [&str; 7] =
     ["grains.gpkg", "grains.csv", "grain_size.tif", "labelled_mesh.ply", "labelled_cloud.laz", "summary.json", REPORT];
 
+/// Names of what may be written into the folder of a run about its results: scores, and a map of them. They go when the
+/// results are replaced.
+pub const SCORES: [&str; 2] = ["validation.json", "validation.png"];
+
 /// What GDAL and SQLite may leave beside a file that they did not finish.
 const SIDECARS: [&str; 6] = ["-journal", "-wal", "-shm", ".aux.xml", ".msk.ovr.tmp", ".ovr.tmp"];
 
@@ -131,7 +135,7 @@ impl OutputFolder {
             fail_point("results.between_names");
         }
         fail_point("results.before_removal");
-        for name in OUTPUTS {
+        for name in OUTPUTS.into_iter().chain(SCORES) {
             let old = self.path.join(name);
             // What an interrupted run began to write.
             let _ = fs::remove_file(self.path.join(format!("{name}.{PARTIAL}")));

@@ -30,7 +30,7 @@ mod laz_stream;
 mod source;
 mod wkb;
 
-pub use atomic::{OUTPUTS, OutputFolder, REPORT};
+pub use atomic::{OUTPUTS, OutputFolder, REPORT, SCORES};
 pub use error::WriteError;
 pub use labelled_mesh::MeshSource;
 pub use source::WholeMesh;
