@@ -37,7 +37,7 @@ pub fn oddities(catalogue: &Catalogue, scale: &Scale, settings: &Settings) -> Ve
     let at_edges = catalogue.grains.iter().filter(|g| g.grain.touches_edge).count();
     if at_edges as f64 > EDGE_SHARE * catalogue.grains.len() as f64 {
         odd.push(format!(
-            "{at_edges} of {} grains touch an edge of the surface, so their sizes are lower bounds: the surface has many holes\nhelp: of a cloud, a denser one, or a Poisson mesh of it (CloudCompare, MeshLab), has fewer",
+            "{at_edges} of {} grains touch an edge of the surface, so their sizes are lower bounds: the surface has many holes\nhelp: take them as such rather than leave them all out; a denser cloud, or a Poisson mesh of a cloud (CloudCompare, MeshLab), has fewer holes",
             catalogue.grains.len()
         ));
     }

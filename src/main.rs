@@ -8,7 +8,7 @@ use gravelometer::error::{Error, ExitCode};
 use gravelometer::pipeline::{Cancelled, Control, Interrupted, share_one_heap};
 use gravelometer::progress::Progress;
 use gravelometer::run::{Job, is_done, run};
-use gravelometer::settings::InputSettings;
+use gravelometer::settings::{InputSettings, Method};
 use gravelometer::validate::{Shown, Validated, validate};
 use std::io::Write;
 use std::time::Duration;
@@ -73,9 +73,13 @@ fn run_command(args: &RunArgs) -> Result<ExitCode, Error> {
         progress.note(&cost_table(&outcome.costs, outcome.triangles));
     }
     progress.note(&format!(
-        "{} grains and {} oversize bodies in {}; halos included, {:.2} triangles were segmented for each of the survey{}",
+        "{} grains{} in {}; halos included, {:.2} triangles were segmented for each of the survey{}",
         outcome.catalogue.grains.len(),
-        outcome.catalogue.oversize.len(),
+        match job.settings.segment.method {
+            // What is too wide is not told from sand.
+            Method::Valleys => String::new(),
+            Method::Rheinwalt2025 => format!(" and {} oversize bodies", outcome.catalogue.oversize.len()),
+        },
         job.out.display(),
         outcome.segmented_per_triangle,
         outcome.curvature_per_triangle.map_or_else(String::new, |n| format!(", and {n:.2} looked at for curvature"))

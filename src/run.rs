@@ -108,6 +108,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let (reach, warnings) = pool.install(|| open_survey(&inputs, &settings.input, progress))?;
     control.check()?;
     let mut warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+    warnings.extend(settings.without_effect());
     warnings.iter().for_each(|w| progress.warn(w));
     let mut findings = work.begin(&reach, settings, job.resume)?;
 
@@ -196,6 +197,12 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
     let touch_steps = (TOUCH_EDGES * index.scale.mean_edge_m / outline_step_m) as i64;
     let mut found = findings.all(&plan)?;
     let left_out = leave_out(&mut found, settings.measure.min_confidence);
+    if left_out > 0 {
+        let least = settings.measure.min_confidence;
+        progress.note(&format!(
+            "{left_out} grains are left out: their confidence is below measure.min_confidence = {least}"
+        ));
+    }
     let (catalogue, tiles) = stitch(found, touch_steps);
 
     // statistics and write

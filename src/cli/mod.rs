@@ -113,7 +113,7 @@ pub struct SettingArgs {
     /// rheinwalt2025
     #[arg(long, value_name = "FILE", help_heading = "Settings")]
     pub config: Option<PathBuf>,
-    /// Set any key of the settings file, such as segment.min_sphericity=0.4; may be given again
+    /// Set any key of the settings file, such as valleys.valley_depth=0.05; may be given again
     #[arg(long, value_name = "SECTION.KEY=VALUE", help_heading = "Settings")]
     pub set: Vec<String>,
     /// Coordinate reference system: EPSG:n, WKT, or a file that holds WKT [input.crs; default: that of the offset file,

@@ -36,12 +36,14 @@ What TRUTH holds:
     represented_ratio  share of the stone's whole surface that is in the mesh, 0 to 1
     radius             of a calibration ball, m: a sphere is fitted to its grain
     id                 if there, the number of the row, from 0
+  From labels of each triangle, in a list: numpy.savez('truth.npz', tri_id=numpy.array(labels, 'int32'))
 
 How stones are counted (Rheinwalt, Purinton & Bookhagen 2025):
   by majority  found if some grain is mostly the stone; further such grains are over-segmentation (false), grains that are
                mostly sand are false, a missed stone of which another grain holds a quarter is under-segmentation
   by overlap   found if intersection over union of the areas of grain and stone is 0.5 or more
-  Grains on hidden stones, or on membranes over unseen space, are held against nobody.
+  Grains on hidden stones, or on membranes over unseen space, are held against nobody. Where only some stones are known,
+  give all other ground one more row of truth.csv, with visible 0.
   `true labels would give`: the same scores for the truth itself, measured in the same way. Stones are partly buried and
   meshes are smooth, so that these have errors of size and attitude too, for which no segmentation is to blame.
 

@@ -71,26 +71,22 @@ fn write_survey(f: &mut Formatter<'_>, survey: &SurveyFigures, files: usize) -> 
         row(f, "points apart", format!("{}; the surface will have edges of about {about}", length(spacing_m)))?;
     }
     let s = &survey.suggestion;
-    let smallest = format!("{} ({})", area(s.smallest_grain_area_m2), length(s.smallest_grain_diameter_m));
-    row(f, "smallest grain", format!("{smallest} across: 50 mean triangles"))?;
+    let across = length(s.smallest_grain_diameter_m);
+    let smallest = format!("{} (a disc of {across}, 50 mean triangles)", area(s.smallest_grain_area_m2));
+    row(f, "can be measured", format!("from {smallest} on; not all that is so small can be told from noise"))?;
     let coarse = if s.coarse { " (coarser than 30 mm: boulders only)" } else { "" };
     row(f, "preset", format!("--config {}{coarse}", s.preset.name()))?;
     let limits = format!("--min-grain-area {:e} --max-grain {}", s.min_grain_area_m2, s.max_grain_m);
     row(f, "suggested limits", limits)?;
     let l = &s.lengths;
-    row(f, "stones divided", format!("by creases sharper than a radius of {}", length(l.bluntest_valley_m)))?;
-    row(f, "bridges cut", format!("up to a width of {}", length(l.widest_bridge_m)))?;
-    row(f, "taken for noise", format!("what is finer than {}", length(l.smoothed_m)))?;
-    row(
-        f,
-        "growth, gaps",
-        format!("{} into valleys; patches up to {} apart", length(l.growth_m), length(l.widest_gap_m)),
-    )?;
-    row(
-        f,
-        "why these",
-        "all are multiples of the mean edge (keys of [valleys]); sharp and smooth meshes take the same",
-    )?;
+    writeln!(f, "  with the default settings, all of which are multiples of the mean edge:")?;
+    let valley = length(l.bluntest_valley_m);
+    row(f, "a valley is", format!("a hollow that bends more sharply than a radius of {valley} (valley_depth)"))?;
+    row(f, "bridges cut", format!("between stones, up to a width of {} (bridge_edges)", length(l.widest_bridge_m)))?;
+    let smoothed = length(l.smoothed_m);
+    row(f, "relief smoothed", format!("on a stone, where it is finer than {smoothed} (normal_passes, crease)"))?;
+    row(f, "growth", format!("up to {} into the valleys around a stone (growth_edges)", length(l.growth_m)))?;
+    row(f, "patches joined", format!("over gaps of up to {} (join_reach_edges)", length(l.widest_gap_m)))?;
     let needs = &survey.needs;
     let least = format!("at least {}", bytes(needs.least_memory_bytes));
     row(f, "memory", format!("{least}; with {} it is worked in one piece", bytes(needs.whole_memory_bytes)))?;

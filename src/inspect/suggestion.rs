@@ -5,7 +5,7 @@
 //! most likely made from a laser scan.
 
 use super::SurfaceFigures;
-use crate::settings::{Settings, ValleySettings};
+use crate::settings::{SegmentSettings, Settings, ValleySettings};
 use serde::Serialize;
 use std::f64::consts::PI;
 use std::path::Path;
@@ -50,10 +50,9 @@ impl Preset {
         }
     }
 
-    /// Widest grain of the preset, metres.
-    fn max_grain_m(self) -> f64 {
-        let settings = Settings::load(Some(Path::new(self.name())), &[]).unwrap_or_default();
-        settings.segment.max_grain_m
+    /// What the preset takes for a grain.
+    fn limits(self) -> SegmentSettings {
+        Settings::load(Some(Path::new(self.name())), &[]).unwrap_or_default().segment
     }
 }
 
@@ -66,7 +65,7 @@ pub struct Suggestion {
     pub smallest_grain_diameter_m: f64,
     /// The settings file that suits.
     pub preset: Preset,
-    /// For `--min-grain-area`, m²: the above, rounded up to two digits.
+    /// For `--min-grain-area`, m²: that of the preset, or the above, rounded up to two digits, where that is more.
     pub min_grain_area_m2: f64,
     /// For `--max-grain`, metres.
     pub max_grain_m: f64,
@@ -79,7 +78,7 @@ pub struct Suggestion {
 /// What the settings of `[valleys]`, which are multiples of the mean edge, come to in a survey.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ValleyLengths {
-    /// Radius of the bluntest crease that divides stones, metres.
+    /// Radius of the bluntest bend that is a valley, metres.
     pub bluntest_valley_m: f64,
     /// Width of the widest bridge between stones that is cut, metres.
     pub widest_bridge_m: f64,
@@ -110,12 +109,13 @@ impl Suggestion {
     pub fn new(surface: &SurfaceFigures, has_colors: bool) -> Suggestion {
         let area = SMALLEST_GRAIN_TRIANGLES * surface.mean_triangle_area_m2;
         let preset = Preset::of(surface.mean_edge_m, has_colors);
+        let limits = preset.limits();
         Suggestion {
             smallest_grain_area_m2: area,
             smallest_grain_diameter_m: (4.0 * area / PI).sqrt(),
             preset,
-            min_grain_area_m2: round_up(area),
-            max_grain_m: preset.max_grain_m(),
+            min_grain_area_m2: round_up(area).max(limits.min_grain_area_m2),
+            max_grain_m: limits.max_grain_m,
             coarse: surface.mean_edge_m > 0.030,
             lengths: ValleyLengths::new(surface.mean_edge_m),
         }

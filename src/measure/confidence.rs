@@ -1,4 +1,4 @@
-//! Confidence: how likely a grain is one whole stone.
+//! Confidence: how likely a grain and one stone have half in common.
 //!
 //! A logistic regression on four figures that have no scale, fitted to 464 grains of five made-up scenes with known stones
 //! (sandboxes, packed and coarse beds, sharp and blurred). A grain was right if it and a stone overlap by half of their
@@ -18,7 +18,7 @@ const CORE: f64 = 5.52;
 /// Of the share of the border where nothing bounds it: its sharpness.
 const FREE: f64 = -4.44;
 
-/// Chance that a grain is one stone, shows at least half of what is visible of it, and not much else, 0 to 1; none where the
+/// Chance that a grain and one stone overlap by half or more of their joint visible surface, 0 to 1; none where the
 /// method gives no evidence, or the grain has no hull.
 pub fn confidence(grain: &Grain) -> Option<f64> {
     let evidence = grain.evidence?;

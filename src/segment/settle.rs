@@ -44,7 +44,7 @@ pub struct Evidence {
     /// Share of the rim where it ends without meeting anything, 0 to 1.
     pub free_rim: f64,
     /// Mean curvature times the square root of the area: 2.5 for half a ball, 0 for a plane.
-    pub roundness: f64,
+    pub bulge: f64,
     /// Share of the area that lies away from valleys, and was not only grown into.
     pub core_share: f64,
     /// Patches that were joined.

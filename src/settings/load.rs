@@ -187,7 +187,8 @@ pub(super) fn range(
     if ok { Ok(()) } else { Err(SettingsError::Range { key, value: value.to_string(), rule }) }
 }
 
-/// Sets one dotted key; the value is read as TOML, and as a plain string where that fails.
+/// Sets one dotted key; the value is read as TOML, as a number where it is one that TOML writes otherwise (`.5`), and as a
+/// plain string where that fails.
 fn assign(table: &mut toml::Table, assignment: &str) -> Result<(), SettingsError> {
     let bad = |message: &str| SettingsError::Parse { origin: format!("--set {assignment}"), message: message.into() };
     let (key, text) = assignment.split_once('=').ok_or_else(|| bad("expected section.key=value"))?;
@@ -196,6 +197,7 @@ fn assign(table: &mut toml::Table, assignment: &str) -> Result<(), SettingsError
         .parse::<toml::Table>()
         .ok()
         .and_then(|mut t| t.remove("v"))
+        .or_else(|| number(text.trim()))
         .unwrap_or_else(|| toml::Value::String(text.trim().to_owned()));
     table
         .entry(section.trim())
@@ -204,6 +206,12 @@ fn assign(table: &mut toml::Table, assignment: &str) -> Result<(), SettingsError
         .ok_or_else(|| bad("is not a section"))?
         .insert(name.trim().to_owned(), value);
     Ok(())
+}
+
+/// A number as people write it.
+fn number(text: &str) -> Option<toml::Value> {
+    let begins_as_one = text.trim_start_matches(['+', '-']).starts_with(|c: char| c == '.' || c.is_ascii_digit());
+    text.parse().ok().filter(|_| begins_as_one).map(toml::Value::Float)
 }
 
 /// A size as text, also where it was written as a plain number of bytes.

@@ -4,6 +4,7 @@
 //! `configs/default.toml` is compared with [`Settings::default`] by a test.
 
 mod load;
+mod unused;
 mod valleys;
 
 pub use valleys::ValleySettings;
@@ -111,8 +112,8 @@ pub enum Method {
     /// Along valleys of the surface: keys of `[valleys]`.
     #[default]
     Valleys,
-    /// As published by Rheinwalt, Purinton & Bookhagen (2025): keys of `[curvature]` and the further ones of
-    /// `[segment]`.
+    /// By curvature, after Rheinwalt, Purinton & Bookhagen (2025): keys of `[curvature]` and the further ones of
+    /// `[segment]`. With the limits as published: `--config rheinwalt2025`.
     Rheinwalt2025,
 }
 

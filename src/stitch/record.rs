@@ -121,10 +121,10 @@ mod tests {
 
     fn evidence() -> impl Strategy<Value = Evidence> {
         ([number(), number(), number(), number()], any::<u32>()).prop_map(
-            |([rim_bend, free_rim, roundness, core_share], patches)| Evidence {
+            |([rim_bend, free_rim, bulge, core_share], patches)| Evidence {
                 rim_bend,
                 free_rim,
-                roundness,
+                bulge,
                 core_share,
                 patches,
             },
@@ -225,7 +225,7 @@ mod tests {
                 all.extend([c.c_error_m, c.seen_share]);
             }
             all.extend([g.ellipsoid_axes_m, g.color_mean, g.color_std].iter().flatten().flatten());
-            let of = |e: Evidence| [e.rim_bend, e.free_rim, e.roundness, e.core_share];
+            let of = |e: Evidence| [e.rim_bend, e.free_rim, e.bulge, e.core_share];
             all.extend(g.evidence.map(of).iter().flatten());
         }
         all.into_iter().map(f64::to_bits).collect()

@@ -106,7 +106,7 @@ impl GrainTable {
         SizedBy { stones: pairs.len(), axes: AxisErrors::of(&pairs), b_axis_mm: BAxis::of(true_b_mm(truth), b_m) }
     }
 
-    /// How far the stated confidence can be trusted, if the table has it.
+    /// How far the stated confidence can be trusted, if the table states any.
     pub(super) fn reliability(&self, scored: &Scored) -> Option<Reliability> {
         let confidence = self.confidence.as_ref()?;
         let judged = scored.judgement.mostly.iter().enumerate().filter(|(_, kind)| kind.is_judged());
@@ -114,7 +114,7 @@ impl GrainTable {
             let confidence = confidence[self.row(scored, grain)?]?;
             Some((confidence, scored.judgement.is_right[grain]))
         };
-        Some(Reliability::of(judged.filter_map(stated)))
+        Some(Reliability::of(judged.filter_map(stated))).filter(|found| !found.bins.is_empty())
     }
 }
 

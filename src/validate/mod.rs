@@ -40,7 +40,7 @@ pub use map::{Shown, draw, shown};
 pub use matched::{AttitudeError, Ball, Match};
 pub use overlap::{Overlaps, TrueSurface};
 pub use principal::{PrincipalBox, Turned};
-pub use report::{Astray, Report, Validated, Validation, validate};
+pub use report::{Astray, Report, Validated, Validation, WRITTEN, validate};
 pub use score::{
     AreaShares, AxisError, AxisErrors, BAxis, Counts, Errors, MiddleMax, Orientation, ReferenceMean, References, Score,
     Scored, Spheres, score,

@@ -12,9 +12,9 @@ use crate::store::write_atomically;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Names of the results in the folder of a run.
-const SCORES: &str = crate::write::SCORES[0];
-const PICTURE: &str = crate::write::SCORES[1];
+/// Names of the results in the folder of a run: scores and picture. A run that replaces its results removes them, and knows
+/// them as `write::SCORES`.
+pub const WRITTEN: [&str; 2] = ["validation.json", "validation.png"];
 
 /// What to validate.
 #[derive(Debug, Clone, Default)]
@@ -125,8 +125,8 @@ pub fn validate(what: &Validation) -> Result<Validated, ValidateError> {
     files.extend(table_file);
 
     let in_run = |name: &str| what.run.is_dir().then(|| what.run.join(name));
-    let json = what.json.clone().or_else(|| in_run(SCORES));
-    let picture = what.picture.clone().or_else(|| in_run(PICTURE));
+    let json = what.json.clone().or_else(|| in_run(WRITTEN[0]));
+    let picture = what.picture.clone().or_else(|| in_run(WRITTEN[1]));
     spare(&files, json.as_deref(), "scores")?;
     spare(&files, picture.as_deref(), "picture")?;
 

@@ -81,8 +81,14 @@ fn write_errors(f: &mut Formatter<'_>, score: &Score) -> fmt::Result {
         "missed: {} merged into another grain (under-segmentation), {} in no grain to speak of",
         errors.under_segmented, errors.missed
     )?;
-    if errors.phantom_ignored > 0 {
-        writeln!(f, "not judged: {} grains on membranes over space that no camera saw", errors.phantom_ignored)?;
+    let Counts { tp, fp, .. } = score.detection_majority;
+    let others = score.segments.saturating_sub(tp + fp + errors.phantom_ignored);
+    if others + errors.phantom_ignored > 0 {
+        writeln!(
+            f,
+            "not judged: {others} on stones that do not count, {} on membranes over space that no camera saw",
+            errors.phantom_ignored
+        )?;
     }
     Ok(())
 }
@@ -90,8 +96,8 @@ fn write_errors(f: &mut Formatter<'_>, score: &Score) -> fmt::Result {
 fn write_axes(f: &mut Formatter<'_>, report: &Report, boxes: &AxisErrors) -> fmt::Result {
     writeln!(f, "\n{:<26}{:>13}{:>26}{:>26}", "axes, errors in percent", "A", "B", "C")?;
     writeln!(f, "{:<26}{}", "", format!("{:>10}{:>8}{:>8}", "mean |e|", "median", "bias").repeat(3))?;
-    write_axis_errors(f, "bounding box (PCA)", boxes)?;
-    let by_run = [("ellipsoid of the run", &report.ellipsoid), ("fit of the run", &report.fit)];
+    write_axis_errors(f, "box: *_axis_m", boxes)?;
+    let by_run = [("ellipsoid_*_axis_m", &report.ellipsoid), ("completed: *_fit_m", &report.fit)];
     for (name, sized) in by_run {
         if let Some(SizedBy { axes, .. }) = sized {
             write_axis_errors(f, name, axes)?;
@@ -129,8 +135,8 @@ fn write_degrees(f: &mut Formatter<'_>, name: &str, [a, b, c, all]: [f64; 4]) ->
 fn write_b_axes(f: &mut Formatter<'_>, report: &Report, boxes: &BAxis) -> fmt::Result {
     writeln!(f, "\n{:<26}{:>9}{:>19}{:>19}", "b axis, mm", "D16", "D50", "D84")?;
     write_sizes(f, "true stones", Some(boxes.truth), None)?;
-    write_sizes(f, "bounding box (PCA)", boxes.segments, boxes.error_percent)?;
-    let by_run = [("ellipsoid of the run", &report.ellipsoid), ("fit of the run", &report.fit)];
+    write_sizes(f, "box: *_axis_m", boxes.segments, boxes.error_percent)?;
+    let by_run = [("ellipsoid_*_axis_m", &report.ellipsoid), ("completed: *_fit_m", &report.fit)];
     for (name, sized) in by_run {
         if let Some(b_axis) = sized.as_ref().and_then(|sized| sized.b_axis_mm) {
             write_sizes(f, name, b_axis.segments, b_axis.error_percent)?;
@@ -186,11 +192,15 @@ fn write_spheres(f: &mut Formatter<'_>, spheres: &Spheres) -> fmt::Result {
 }
 
 fn write_reliability(f: &mut Formatter<'_>, reliability: &Reliability) -> fmt::Result {
-    writeln!(f, "\n{:<26}{:>10}{:>10}{:>10}", "confidence of the run", "grains", "stated", "right")?;
+    writeln!(f, "\n{:<26}{:>10}{:>10}{:>10}", "confidence stated", "grains", "mean", "right")?;
     for bin in &reliability.bins {
         let name = format!("{:.1} to {:.1}", bin.from, bin.from + 0.1);
         let shares = [bin.mean_confidence, bin.share_right].map(|share| format!("{share:.3}"));
         writeln!(f, "{name:<26}{:>10}{:>10}{:>10}", bin.grains, shares[0], shares[1])?;
     }
-    writeln!(f, "{:<26}{:.3}", "mean difference", reliability.calibration_error)
+    let difference = reliability.calibration_error;
+    writeln!(
+        f,
+        "right: overlap of 0.5 or more; mean and share that is right differ by {difference:.3} (mean over grains)"
+    )
 }

@@ -159,7 +159,7 @@ fn the_folder_of_a_run_gets_scores_and_a_picture_and_its_own_axes_are_scored() {
     }
     let text = found.report.to_string();
     for part in
-        ["2 stones count, 4 grains", "b axis, mm", "ellipsoid of the run", "fit of the run", "true labels would give"]
+        ["2 stones count, 4 grains", "b axis, mm", "ellipsoid_*_axis_m", "completed: *_fit_m", "true labels would give"]
     {
         assert!(text.contains(part), "{part} in\n{text}");
     }
@@ -200,4 +200,9 @@ fn the_command_prints_the_tables_and_where_the_picture_is() {
     let said = String::from_utf8(refused.stderr).unwrap();
     assert_eq!(refused.status.code(), Some(1));
     assert!(said.contains("run again with --labelled-mesh"), "{said}");
+}
+
+#[test]
+fn a_run_that_replaces_its_results_knows_what_scores_of_them_are_called() {
+    assert_eq!(gravelometer::validate::WRITTEN, gravelometer::write::SCORES);
 }

@@ -57,7 +57,7 @@ pub fn evidence(ground: &Ground, grown: &[u32], judged: &[Judged], fates: &Fates
     let tell = |s: Sums| Evidence {
         rim_bend: over(s.bend, s.rim as f64),
         free_rim: over(s.free as f64, s.rim as f64),
-        roundness: over(s.mean, s.area_m2) / ground.mean_edge_m * s.area_m2.sqrt(),
+        bulge: over(s.mean, s.area_m2) / ground.mean_edge_m * s.area_m2.sqrt(),
         core_share: over(s.core_m2, s.area_m2).min(1.0),
         patches: s.cores,
     };

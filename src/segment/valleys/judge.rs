@@ -35,13 +35,13 @@ pub struct Judged {
 struct Means {
     area_m2: f64,
     /// Mean curvature times the square root of the area: above 2 for a ball, 0 for a plane.
-    roundness: f64,
+    bulge: f64,
     /// Upward part of the normal.
     up: f64,
 }
 
-/// Weight of the roundness of a core against the sphericity of its hull.
-const ROUNDNESS: f64 = 0.5;
+/// Weight of the bulge of a core against the sphericity of its hull.
+const BULGE: f64 = 0.5;
 /// A core whose normals point up in the mean by more than this lies level, as sand does.
 const LEVEL: f64 = 0.9;
 /// A level core that lies so deep below its hull, as a share of the square root of its area, is still plain,
@@ -53,7 +53,7 @@ const PART: f64 = 0.3;
 
 /// Judges all cores by themselves.
 ///
-/// The score of a core is the sphericity of its hull plus half its roundness, less for what is level and
+/// The score of a core is the sphericity of its hull plus half its bulge, less for what is level and
 /// hollow: sheets of sand and membranes score low. A core wider than a grain may be is a sheet whatever else it
 /// is; of one that is not whole nothing else is known.
 pub fn judge(ground: &Ground, cores: &Cores, (segment, settings): (&SegmentSettings, &ValleySettings)) -> Vec<Judged> {
@@ -86,14 +86,14 @@ impl Means {
             up += of * f64::from(ground.normals[v].z);
         }
         let over = 1.0 / area.max(f64::MIN_POSITIVE);
-        let roundness = bend * over / ground.mean_edge_m * area.sqrt();
-        Means { area_m2: area, roundness, up: up * over }
+        let bulge = bend * over / ground.mean_edge_m * area.sqrt();
+        Means { area_m2: area, bulge, up: up * over }
     }
 }
 
 fn kind(ground: &Ground, vertices: &[u32], means: &Means, settings: &ValleySettings) -> Kind {
     // The sphericity that makes a score, which bounds of the hull mostly decide.
-    let sphericity = |score: f64| score - ROUNDNESS * means.roundness;
+    let sphericity = |score: f64| score - BULGE * means.bulge;
     if sphericity(settings.stone_score) <= 0.0 && means.up <= LEVEL {
         return Kind::Stone;
     }
