@@ -15,7 +15,8 @@ const LOOSE_SHARE: f64 = 0.9;
 const EDGE_SHARE: f64 = 0.9;
 
 /// What is odd about a result without being wrong, each with what to do.
-pub fn oddities(catalogue: &Catalogue, scale: &Scale, settings: &Settings) -> Vec<String> {
+/// `left_out` grains had too little confidence.
+pub fn oddities(catalogue: &Catalogue, left_out: u64, scale: &Scale, settings: &Settings) -> Vec<String> {
     let mut odd = Vec::new();
     let wider = catalogue.oversize.len();
     // Of a closed or open surface there are two triangles for each vertex; of loose ones, a third.
@@ -24,7 +25,7 @@ pub fn oddities(catalogue: &Catalogue, scale: &Scale, settings: &Settings) -> Ve
             "the {} triangles have {} vertices: nearly every triangle has its own, so none is joined to another and no grain can be found\nhelp: join them, for instance in MeshLab with Filters > Cleaning and Repairing > Merge Close Vertices",
             scale.triangles, scale.vertices
         ));
-    } else if catalogue.grains.is_empty() {
+    } else if catalogue.grains.is_empty() && left_out == 0 {
         odd.push(format!(
             "no grain was found among {} triangles with a mean edge of {:.3e} m, a smallest grain of {:.3e} m² and a widest of {} m{}\nhelp: `gravelometer inspect` says what the survey can show; look at --unit, --min-grain-area and --max-grain",
             scale.triangles,

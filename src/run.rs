@@ -207,7 +207,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
 
     // statistics and write
     let figures = work.figures();
-    let odd = figures.iter().flat_map(oddities_of_cloud).chain(oddities(&catalogue, &index.scale, settings));
+    let odd = figures.iter().flat_map(oddities_of_cloud).chain(oddities(&catalogue, left_out, &index.scale, settings));
     odd.for_each(|odd| {
         progress.warn(&odd);
         warnings.push(odd);

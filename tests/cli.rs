@@ -245,11 +245,12 @@ fn older_results_are_touched_by_force_only_and_by_complete_results_only() {
     assert_eq!(run(&mesh, &out, &["--labelled-mesh"]).code, 0);
     let notes = out.join("notes.txt");
     std::fs::write(&notes, "mine").unwrap();
-    let scores = out.join("validation.json");
-    std::fs::write(&scores, "of these results").unwrap();
+    let scores = ["validation.json", "validation.png"].map(|name| out.join(name));
+    scores.iter().for_each(|path| std::fs::write(path, "of these results").unwrap());
     let before = contents(&out);
-    assert_eq!(before.len(), 8, "{:?}", before.keys());
-    run(&mesh, &out, &[]).fails(1, &["holds files already", "--force", "\nhelp: "]);
+    assert_eq!(before.len(), 9, "{:?}", before.keys());
+    let refusal = ["holds files already", "validation.json", "validation.png", "--force", "\nhelp: "];
+    run(&mesh, &out, &[]).fails(1, &refusal);
     assert!(contents(&out) == before, "a refused run changed the folder");
     let damaged = folder.path().join("damaged.ply");
     let bytes = std::fs::read(&mesh).unwrap();
@@ -260,7 +261,7 @@ fn older_results_are_touched_by_force_only_and_by_complete_results_only() {
     let after = contents(&out);
     assert!(after[&out.join("grain_size.tif")] != before[&out.join("grain_size.tif")], "nothing was replaced");
     assert!(!after.contains_key(&out.join("labelled_mesh.ply")), "an older result was left among new ones");
-    assert!(!after.contains_key(&scores), "scores of older results were left among new ones");
+    assert!(!scores.iter().any(|path| after.contains_key(path)), "scores of older results were left among new ones");
     assert_eq!(after[&notes], b"mine");
 }
 

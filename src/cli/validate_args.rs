@@ -66,10 +66,10 @@ pub struct ValidateArgs {
     #[arg(long)]
     pub zero_is_none: bool,
     /// Stones count from this connected area in the mesh on, m², in place of those that truth.csv calls visible
-    #[arg(long, value_name = "M2")]
+    #[arg(long, value_name = "M2", value_parser = area)]
     pub visible_area: Option<f64>,
     /// Grains smaller than this are not looked at, m²
-    #[arg(long, value_name = "M2", default_value_t = 0.0)]
+    #[arg(long, value_name = "M2", default_value_t = 0.0, value_parser = area)]
     pub min_area: f64,
     /// Write all scores as JSON [default: validation.json in RUN, if that is a folder]
     #[arg(long, value_name = "FILE")]
@@ -77,6 +77,12 @@ pub struct ValidateArgs {
     /// Draw found, missed, split and merged stones from above, as PNG [default: validation.png in RUN, if that is a folder]
     #[arg(long, value_name = "FILE")]
     pub picture: Option<PathBuf>,
+}
+
+/// An area of 0 or more, m².
+fn area(text: &str) -> Result<f64, String> {
+    let area: f64 = text.parse().map_err(|_| "is no number".to_owned())?;
+    if area.is_finite() && area >= 0.0 { Ok(area) } else { Err("must be 0 or more, m²".to_owned()) }
 }
 
 impl ValidateArgs {

@@ -142,12 +142,35 @@ pub(super) fn scatter<I: Id>(
     Ok(scatter)
 }
 
+/// The corners turned so that the lowest comes first; where that is there twice, it comes second as well.
 fn lowest_first([a, b, c]: [u64; 3]) -> [u64; 3] {
-    if a <= b && a <= c {
+    let turned = if a <= b && a <= c {
         [a, b, c]
     } else if b <= c {
         [b, c, a]
     } else {
         [c, a, b]
+    };
+    match turned {
+        [first, second, last] if last == first => [last, first, second],
+        turned => turned,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_triangle_is_the_same_whichever_corner_the_file_names_first() {
+        for corners in [[4, 7, 9], [9, 7, 4], [4, 4, 7], [7, 7, 4], [4, 4, 4]] {
+            let mut turned = corners;
+            for _ in 0..3 {
+                turned.rotate_left(1);
+                assert_eq!(lowest_first(turned), lowest_first(corners), "{turned:?}");
+            }
+            let [a, b, c] = lowest_first(corners);
+            assert!(a <= b && a <= c && [[a, b, c], [b, c, a], [c, a, b]].contains(&corners), "{corners:?}");
+        }
     }
 }

@@ -98,7 +98,7 @@ pub struct Contents {
 }
 
 /// What a surface is made of.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct SurfaceFigures {
     /// Mean length of the triangles' edges (an edge counts once per triangle), metres.
     pub mean_edge_m: f64,

@@ -5,10 +5,9 @@
 //! most likely made from a laser scan.
 
 use super::SurfaceFigures;
-use crate::settings::{SegmentSettings, Settings, ValleySettings};
+use crate::settings::{PRESETS, SegmentSettings, Settings, ValleySettings};
 use serde::Serialize;
 use std::f64::consts::PI;
-use std::path::Path;
 
 /// Triangles that the smallest measurable grain needs.
 const SMALLEST_GRAIN_TRIANGLES: f64 = 50.0;
@@ -52,7 +51,10 @@ impl Preset {
 
     /// What the preset takes for a grain.
     fn limits(self) -> SegmentSettings {
-        Settings::load(Some(Path::new(self.name())), &[]).unwrap_or_default().segment
+        // Not by name: a file may have that name.
+        let preset = PRESETS.iter().find(|(name, _)| *name == self.name());
+        let settings: Option<Settings> = preset.and_then(|(_, text)| toml::from_str(text).ok());
+        settings.unwrap_or_default().segment
     }
 }
 
@@ -143,6 +145,21 @@ mod tests {
         assert_eq!(round_up(4e-5), 4e-5);
         assert_eq!(round_up(9.95e-3), 1e-2);
         assert_eq!(round_up(0.0), 0.0);
+    }
+
+    #[test]
+    fn the_smallest_grain_is_that_of_the_preset_or_of_the_mesh() {
+        let limits = [Preset::Sandbox, Preset::Mast, Preset::Drone, Preset::LaserScan].map(Preset::limits);
+        let default = SegmentSettings::default();
+        assert_eq!(limits[2].min_grain_area_m2, 5e-3);
+        assert!(limits.iter().all(|l| l.max_grain_m != default.max_grain_m), "{limits:?}");
+        let suggested = |mean_edge_m: f64| {
+            let mean_triangle_area_m2 = 0.4 * mean_edge_m * mean_edge_m;
+            let surface = SurfaceFigures { mean_edge_m, mean_triangle_area_m2, ..SurfaceFigures::default() };
+            Suggestion::new(&surface, true).min_grain_area_m2
+        };
+        assert_eq!(suggested(0.0007), limits[0].min_grain_area_m2);
+        assert_eq!(suggested(0.04), 0.032);
     }
 
     #[test]

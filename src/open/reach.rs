@@ -38,6 +38,9 @@ const LONGEST_EXTENT_M: f64 = 1e5;
 /// A mean edge above the first, over an extent in plan above the second, is rather one of millimetres: too
 /// coarse to show gravel, metres. The finer pair is that of a box of sand scanned at 0.1 mm.
 const LIKE_MILLIMETRES_M: [(f64, f64); 2] = [(0.2, 50.0), (0.05, 200.0)];
+/// More of a surface than this faces down, in plan, where something is upside down: of beds of stones seen from all sides,
+/// with their overhangs, up to 0.28 does.
+const MOST_FACING_DOWN: f64 = 0.4;
 /// A line feed, or a line feed and a carriage return, behind the last record is no finding.
 pub(super) const TOLERATED_TRAILING_BYTES: u64 = 2;
 
@@ -77,6 +80,9 @@ impl Reach {
                 check_not_degrees(&file.path.display().to_string(), sample, file.input_bounds())?;
             }
             coarse.extend(check_precision(file, sample, &reach.frame)?);
+            let path = || file.path.display().to_string();
+            let down = sample.share_facing_down().filter(|&share| share > MOST_FACING_DOWN);
+            coarse.extend(down.map(|share| Warning::FacesDown { path: path(), share }));
         }
         let mut warnings = reach.warnings(input, samples[0].mean_edge_m());
         warnings.extend(coarse);

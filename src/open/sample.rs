@@ -18,6 +18,8 @@ pub(super) struct EdgeSample {
     length_m: f64,
     rise_m: f64,
     reach_m: f64,
+    /// Twice the area in plan of what faces up, and of what faces down, m².
+    faces_m2: [f64; 2],
     is_cloud: bool,
 }
 
@@ -34,6 +36,10 @@ impl EdgeSample {
                 let corners = if is_cloud { [i, i + 1, i] } else { mesh.faces.triangle(mesh.bytes(), i) };
                 let at = |v: u64| frame.local(mesh.vertices.position(mesh.bytes(), v));
                 let [a, b, c] = corners.map(at);
+                let twice_m2 = (b - a).cross(c - a).z;
+                if twice_m2.is_finite() && !is_cloud {
+                    sample.faces_m2[usize::from(twice_m2 < 0.0)] += twice_m2.abs();
+                }
                 for edge in [b - a, c - b, a - c].into_iter().take(if is_cloud { 1 } else { 3 }) {
                     // A point of a cloud may be no number.
                     if edge.is_finite() {
@@ -62,6 +68,12 @@ impl EdgeSample {
     /// takes all length from others, but it leaves this mean nearly as it was.
     pub(super) fn mean_with_collapsed_m(&self) -> Option<f64> {
         (self.edges > 0 && !self.is_cloud).then(|| self.length_m / f64::from(self.edges))
+    }
+
+    /// Share of the surface, in plan, that faces down; none for a cloud.
+    pub(super) fn share_facing_down(&self) -> Option<f64> {
+        let [up, down] = self.faces_m2;
+        (up + down > 0.0).then(|| down / (up + down))
     }
 
     /// How far edges rise for each part that they reach in plan.

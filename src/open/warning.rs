@@ -58,6 +58,13 @@ pub enum Warning {
         /// Mean edge, metres.
         edge_m: f64,
     },
+    /// Much of the surface faces down.
+    FacesDown {
+        /// The file.
+        path: String,
+        /// Share of the surface, in plan.
+        share: f64,
+    },
     /// A header speaks of a coordinate system, but not so that it can be used.
     CrsUnusable {
         /// The file.
@@ -116,6 +123,13 @@ impl fmt::Display for Warning {
                 f,
                 "{path}: coordinates are printed in steps of {step_m} m, and the mean edge is {edge_m:.3e} m long: \
                  unless they are exact, the surface is roughened\nhelp: export them with more digits, or as binary PLY"
+            ),
+            Warning::FacesDown { path, share } => write!(
+                f,
+                "{path}: {:.0} % of the surface, in plan, faces down: faces may be turned over, z may point down, or the \
+                 mesh is closed\nhelp: stones are what bends up: turn the faces over (MeshLab: Filters > Normals > Invert \
+                 Faces Orientation) or the axes (there: Transform), and cut off a closed mesh's floor",
+                100.0 * share
             ),
             Warning::CrsUnusable { path, reason } => write!(
                 f,

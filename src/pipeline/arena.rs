@@ -6,7 +6,8 @@
 //!
 //! # Contract
 //! `mallopt` sets a number inside the allocator and is safe by itself. It is called before other threads are
-//! started, since it does not change threads that have a heap already. `malloc_trim` takes the heap's own lock.
+//! started, since it does not change threads that have a heap already. `malloc_trim` and `mallinfo` take the heap's own
+//! lock; `mallinfo`, which every version of the library has, may run beside anything but `mallopt` and the first allocation.
 #![allow(unsafe_code)]
 
 /// Blocks below this size come from the heap, bytes: the largest that the allocator takes.
@@ -33,9 +34,10 @@ pub fn share_one_heap() {
 /// pieces: the index of 10 million triangles left 190 MiB, which lay idle beside the largest tiles.
 pub fn return_free_memory() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
-    // SAFETY: the calls have no preconditions.
+    // SAFETY: `share_one_heap` has returned before anything is computed. Figures above 4 GiB wrap round: then what is free
+    // may stay until the next stage.
     unsafe {
-        if libc::mallinfo2().fordblks > IDLE_BYTES as usize {
+        if libc::mallinfo().fordblks as u32 > IDLE_BYTES as u32 {
             libc::malloc_trim(0);
         }
     }

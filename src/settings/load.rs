@@ -187,8 +187,8 @@ pub(super) fn range(
     if ok { Ok(()) } else { Err(SettingsError::Range { key, value: value.to_string(), rule }) }
 }
 
-/// Sets one dotted key; the value is read as TOML, as a number where it is one that TOML writes otherwise (`.5`), and as a
-/// plain string where that fails.
+/// Sets one dotted key; the value is read as TOML, as a number where it is one without the 0 before the point (`.5`), and as
+/// a plain string where that fails.
 fn assign(table: &mut toml::Table, assignment: &str) -> Result<(), SettingsError> {
     let bad = |message: &str| SettingsError::Parse { origin: format!("--set {assignment}"), message: message.into() };
     let (key, text) = assignment.split_once('=').ok_or_else(|| bad("expected section.key=value"))?;
@@ -208,10 +208,10 @@ fn assign(table: &mut toml::Table, assignment: &str) -> Result<(), SettingsError
     Ok(())
 }
 
-/// A number as people write it.
+/// A number that begins with its point.
 fn number(text: &str) -> Option<toml::Value> {
-    let begins_as_one = text.trim_start_matches(['+', '-']).starts_with(|c: char| c == '.' || c.is_ascii_digit());
-    text.parse().ok().filter(|_| begins_as_one).map(toml::Value::Float)
+    let begins_with_its_point = text.trim_start_matches(['+', '-']).starts_with('.');
+    text.parse().ok().filter(|_| begins_with_its_point).map(toml::Value::Float)
 }
 
 /// A size as text, also where it was written as a plain number of bytes.
@@ -256,6 +256,17 @@ pub fn parse_bytes(text: &str) -> Option<u64> {
 mod tests {
     use super::*;
     use crate::settings::AreaRule;
+
+    #[test]
+    fn a_number_may_begin_with_its_point_and_a_name_with_a_digit() {
+        let load = |assignment: &str| Settings::load(None, &[assignment.into()]);
+        assert_eq!(load("valleys.valley_depth=.05").expect("a number").valleys.valley_depth, 0.05);
+        assert_eq!(load("valleys.stone_score=-.5").expect("a number").valleys.stone_score, -0.5);
+        for name in ["0012", "1.txt", "2024."] {
+            assert_eq!(load(&format!("input.offset_file={name}")).expect("a name").input.offset_file, name);
+        }
+        assert!(load("valleys.valley_depth=--5").is_err());
+    }
 
     #[test]
     fn sizes_are_read_in_binary_and_decimal_units() {

@@ -1,4 +1,4 @@
-//! Settings that somebody changed and that the chosen method does not ask for.
+//! Settings that a file, a preset or somebody changed, and that the chosen method does not ask for.
 
 use super::{Method, Settings};
 
@@ -10,14 +10,17 @@ impl Settings {
     pub fn without_effect(&self) -> Option<String> {
         let method = self.segment.method;
         let of_other = |section: &str, key: &str| match method {
-            Method::Valleys => section == "curvature" || (section == "segment" && !OF_BOTH.contains(&key)),
+            Method::Valleys => {
+                let of_curvature = section == "curvature" || (section, key) == ("work", "instructions");
+                of_curvature || (section == "segment" && !OF_BOTH.contains(&key))
+            }
             Method::Rheinwalt2025 => section == "valleys" || (section, key) == ("measure", "min_confidence"),
         };
         let [these, default] = [self, &Settings::default()].map(|s| toml::Table::try_from(s).unwrap_or_default());
         let mut keys = Vec::new();
         for (section, value) in &these {
             for (key, value) in value.as_table().into_iter().flatten() {
-                if of_other(section, key) && default[section].get(key) != Some(value) {
+                if of_other(section, key) && default.get(section).and_then(|s| s.get(key)) != Some(value) {
                     keys.push(format!("{section}.{key}"));
                 }
             }
@@ -48,6 +51,7 @@ mod tests {
         assert!(named.starts_with("segment.min_sphericity: no effect with the method valleys"), "{named}");
         let named = with(&[&changed[..], &["segment.method=rheinwalt2025"]].concat()).expect("a warning");
         assert!(named.starts_with("measure.min_confidence, valleys.valley_depth: no effect"), "{named}");
+        assert!(with(&["work.instructions=scalar"]).is_some_and(|named| named.starts_with("work.instructions: ")));
     }
 
     #[test]

@@ -6,8 +6,9 @@
 
 use super::TileFinding;
 
-/// First byte of every record. It must change when a field of [`TileFinding`] or of what it holds does.
-const FORMAT: u8 = 2;
+/// First byte of every record. It must change when a field of [`TileFinding`] or of what it holds does, and
+/// when the same surface gives other figures.
+const FORMAT: u8 = 3;
 
 /// Bytes that hold no finding.
 #[derive(Debug, thiserror::Error)]

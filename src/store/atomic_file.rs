@@ -12,11 +12,17 @@ pub const PARTIAL: &str = "partial";
 /// Replaces the file at `path`, or makes it. The bytes lie on the disk when this returns.
 ///
 /// They are written as `NAME.partial` beside it, flushed, and renamed. A crash can leave that file, and the
-/// next call replaces it. Two processes must not write the same path at once.
+/// next call replaces it. Two processes must not write the same path at once. Of a link it is the file behind it that is
+/// replaced; a device or a pipe is written to.
 ///
 /// # Errors
 /// The folder is not there or cannot be written to, or the disk is full. The old file is then untouched.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
+    let behind = if path.is_symlink() { path.canonicalize().ok() } else { None };
+    let path = behind.as_deref().unwrap_or(path);
+    if path.exists() && !path.is_file() && !path.is_dir() {
+        return fs::write(path, bytes).map_err(|source| StoreError::io(path, "write to it", source));
+    }
     let partial = partial_name(path);
     write_and_sync(&partial, bytes)
         .and_then(|()| {
@@ -78,6 +84,24 @@ mod tests {
             assert_eq!(fs::read_to_string(&path).unwrap(), text);
             assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
         }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_is_no_plain_file_is_not_replaced_by_one() {
+        use std::os::unix::fs::{FileTypeExt, symlink};
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::write(at("real"), "old").unwrap();
+        symlink(at("real"), at("link")).unwrap();
+        write_atomically(&at("link"), b"new").unwrap();
+        assert!(at("link").is_symlink());
+        assert_eq!(fs::read_to_string(at("real")).unwrap(), "new");
+        let _listener = std::os::unix::net::UnixListener::bind(at("socket")).unwrap();
+        let error = write_atomically(&at("socket"), b"new").unwrap_err().to_string();
+        assert!(error.contains("socket: cannot write to it: "), "{error}");
+        assert!(fs::metadata(at("socket")).unwrap().file_type().is_socket());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3);
     }
 
     #[test]

@@ -9,7 +9,8 @@ use crate::store::StoreError;
 
 /// Bytes that one loaded triangle takes at the height of segmentation.
 ///
-/// Counted, for half as many vertices as triangles: positions 12, corners 12, complete 0.5, in_core 1, the divergence
+/// Counted, for half as many vertices as triangles (a mesh whose triangles are not joined has six times as many), few of
+/// them with more than eight neighbours: positions 12, corners 12, complete 0.5, in_core 1, the divergence
 /// of the vertices 4, neighbours 12; states and labels 5, components while they are numbered 8, vertices of bodies 6; or
 /// instead of the last three colours 6, triangles of grains 4 and what is measured; makes 60. Along
 /// valleys instead of the divergence and what follows: neighbours of the vertices 17, normals, bends and areas 16, floods and

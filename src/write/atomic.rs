@@ -80,7 +80,8 @@ impl OutputFolder {
     pub fn spare(&self, inputs: &[PathBuf]) -> Result<(), WriteError> {
         for input in inputs {
             let Ok(real) = input.canonicalize() else { continue };
-            let names = OUTPUTS.into_iter().flat_map(|name| [name.to_owned(), format!("{name}.{PARTIAL}")]);
+            let names =
+                OUTPUTS.into_iter().chain(SCORES).flat_map(|name| [name.to_owned(), format!("{name}.{PARTIAL}")]);
             for target in names.map(|name| self.path.join(name)) {
                 if target.canonicalize().is_ok_and(|target| target == real) {
                     return Err(WriteError::InputInTheWay { input: input.clone(), target });
@@ -215,7 +216,7 @@ fn contents(path: &Path, ignoring: &[&str]) -> io::Result<(Vec<String>, usize)> 
         if unfinished || name == PROBE || ignoring.contains(&name.as_str()) {
             continue;
         }
-        if OUTPUTS.contains(&name.as_str()) {
+        if OUTPUTS.into_iter().chain(SCORES).any(|ours| ours == name) {
             ours.push(name);
         } else {
             others += 1;

@@ -120,7 +120,7 @@ pub const COLUMNS: &[Column] = columns! {
     "a_axis_m" Real "long axis: extent along the first principal axis of the vertices" |r| Value::real(r.grain.axes_m[0]);
     "b_axis_m" Real "intermediate axis, the grain size of sieves and Wolman counts" |r| Value::real(r.grain.axes_m[1]);
     "c_axis_m" Real "short extent of the visible part: too short where the lower half is buried, too long where a tilted flank is all that shows" |r| Value::real(r.grain.axes_m[2]);
-    "ellipsoid_a_axis_m" Real "long axis of the least-squares ellipsoid; none where no ellipsoid fits, or only one three times as long as what is seen" |r| Value::maybe(r.grain.ellipsoid_axes_m.map(|e| e[0]));
+    "ellipsoid_a_axis_m" Real "long axis of the least-squares ellipsoid; none where no ellipsoid fits, or only one that is far longer than what is seen" |r| Value::maybe(r.grain.ellipsoid_axes_m.map(|e| e[0]));
     "ellipsoid_b_axis_m" Real "intermediate axis of the same" |r| Value::maybe(r.grain.ellipsoid_axes_m.map(|e| e[1]));
     "ellipsoid_c_axis_m" Real "short axis of the same" |r| Value::maybe(r.grain.ellipsoid_axes_m.map(|e| e[2]));
     "a_fit_m" Real "long axis of the completed stone: a rounded body fitted to the visible part, and to the usual shape of stones; none where too little is seen" |r| Value::maybe(r.grain.completed.map(|c| c.axes_m[0]));

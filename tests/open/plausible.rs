@@ -154,3 +154,31 @@ fn a_grid_that_is_printed_in_full_is_not_coarse() {
         open_bytes(text.as_bytes()).unwrap_or_else(|e| panic!("{spacing}: {e}"));
     }
 }
+
+#[test]
+fn a_surface_that_faces_down_is_warned_of_and_one_with_overhangs_is_not() {
+    let metres = InputSettings { unit: Unit::M, ..InputSettings::default() };
+    let warnings = |text: &str| open_with("reach.ply", text.as_bytes(), &metres).expect("readable").1;
+    let text = sheet(30, [2.0, 2.0], 0.1, [0.0; 3], fully);
+    assert!(warnings(&text).is_empty());
+    // Every `nth` face turned over.
+    let turned = |nth: usize| -> String {
+        let mut faces = 0;
+        let lines = text.lines().map(|line| {
+            let fields: Vec<&str> = line.split(' ').collect();
+            let &[_, a, b, c] = fields.as_slice() else { return line.to_owned() };
+            if line.starts_with("element") || line.starts_with("property") {
+                return line.to_owned();
+            }
+            faces += 1;
+            if faces % nth == 0 { format!("3 {a} {c} {b}") } else { line.to_owned() }
+        });
+        lines.map(|line| line + "\n").collect()
+    };
+    assert!(warnings(&turned(4)).is_empty());
+    let found = warnings(&turned(1));
+    let [warning @ Warning::FacesDown { share, .. }] = found.as_slice() else { panic!("{found:?}") };
+    assert!(*share > 0.99, "{share}");
+    assert_contains(&warning.to_string(), &["reach.ply: 100 % of the surface", "Invert Faces Orientation"]);
+    assert!(matches!(warnings(&turned(2)).as_slice(), [Warning::FacesDown { .. }]));
+}

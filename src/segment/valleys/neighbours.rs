@@ -190,7 +190,7 @@ mod tests {
             seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (seed >> 33) % n
         };
-        let (mut edges, mut closed) = (0, 0);
+        let mut edges = 0;
         for round in 0..800 {
             let (vertices, faces) = if round == 0 { (200, 900) } else { (1 + below(40), below(90)) };
             let corner = |below: &mut dyn FnMut(u64) -> u64| below(vertices) as u32;
@@ -212,14 +212,25 @@ mod tests {
                 _ => {}
             }
             let (vertices, triangles) = if round % 2 == 0 { (vertices, strewn) } else { (u64::from(rim) + 1, fan) };
-            closed += u32::from(round % 2 == 1 && triangles.len() == rim as usize);
             let mesh = TileMesh {
                 triangles: triangles.clone(),
                 positions: vec![DVec3::ZERO; vertices as usize],
                 ..TileMesh::default()
             };
             let found = Neighbours::of(&Bands::of(&mesh));
+            // Among others, with other numbers, in other bands: in the same order.
+            let further = 1 + below(20) as u32;
+            let others = [[0, further - 1, further / 2]; 4];
+            let moved = triangles.iter().map(|triangle| triangle.map(|v| v + further));
+            let elsewhere = TileMesh {
+                triangles: others.into_iter().chain(moved).collect(),
+                positions: vec![DVec3::ZERO; vertices as usize + further as usize],
+                ..TileMesh::default()
+            };
+            let there = Neighbours::of(&Bands::of(&elsewhere));
             for v in 0..vertices as u32 {
+                let moved: Vec<u32> = found.around(v as usize).iter().map(|u| u + further).collect();
+                assert_eq!(there.around((v + further) as usize), moved);
                 let mut expected: Vec<(u32, usize)> = Vec::new();
                 for &[a, b, c] in &triangles {
                     for [here, next, other] in [[a, b, c], [b, c, a], [c, a, b]] {
@@ -245,6 +256,17 @@ mod tests {
                 edges += ends.len();
             }
         }
-        assert!(edges > 10_000 && closed > 200, "{edges} edges, {closed} fans");
+        assert!(edges > 10_000, "{edges}");
+    }
+
+    #[test]
+    fn a_ring_is_closed_where_every_neighbour_comes_next_once_and_before_once() {
+        let ring = |numbers: &[u32], fill: u32| std::array::from_fn(|i| numbers.get(i).copied().unwrap_or(fill));
+        let closed = |next: &[u32], before: &[u32]| is_closed(9, &ring(next, 100), &ring(before, NOBODY));
+        assert!(closed(&[1, 2, 3], &[2, 3, 1]) && closed(&[1, 2], &[2, 1]) && closed(&[], &[]));
+        assert!(closed(&[1, 2, 3, 4, 5, 6, 7, 8], &[8, 7, 6, 5, 4, 3, 2, 1]), "eight in any order");
+        assert!(!closed(&[1, 2, 3], &[2, 3, 4]), "an open fan");
+        assert!(!closed(&[1, 1, 2], &[2, 1, 2]) && !closed(&[1, 2, 2], &[1, 1, 2]), "one is named three times");
+        assert!(!closed(&[1, 9, 2], &[9, 2, 1]), "the vertex itself");
     }
 }
