@@ -14,7 +14,7 @@ use crate::store::StoreError;
 /// of the vertices 4, neighbours 12; states and labels 5, components while they are numbered 8, vertices of bodies 6; or
 /// instead of the last three colours 6, triangles of grains 4 and what is measured; makes 60. Along
 /// valleys instead of the divergence and what follows: neighbours of the vertices 17, normals, bends and areas 16, floods and
-/// labels 11; makes 70. Measured with 10 million in one tile: 68, and 74 along valleys. Something for growth comes on top;
+/// labels 11; makes 70. Measured with 10 million in one tile: 68, and 74 to 78 along valleys. Something for growth comes on top;
 /// unknown triangles take up to 18 more each.
 pub const BYTES_PER_TRIANGLE: u64 = 82;
 
