@@ -126,7 +126,7 @@ mod tests {
         assert_eq!(cuts(10_000_000, 2, 2 * GIB), Cuts { least: 1.0, divisible: false });
         assert_eq!(cuts(10_000_000, 8, 2 * GIB), Cuts { least: 1.0, divisible: true });
         // Whole it fits, with halos it would not.
-        assert_eq!(cuts(13_000_000, 2, GIB), Cuts { least: 1.0, divisible: false });
+        assert_eq!(cuts(11_000_000, 2, GIB), Cuts { least: 1.0, divisible: false });
         assert_eq!(cuts(0, 8, GIB), Cuts { least: 1.0, divisible: false });
         // However much memory there is, a tile's numbers and what a crash may cost are bounded.
         assert!((cuts(2_000_000_000, 1, 1000 * GIB).least - 33.3).abs() < 0.1);

@@ -4,6 +4,7 @@
 
 mod support;
 
+use gravelometer::geometry::DVec3;
 use gravelometer::index::{BuildRoom, CellBlock, Index};
 use gravelometer::open::MemorySurface;
 use gravelometer::passes::{Recipe, Telling};
@@ -30,6 +31,12 @@ fn how(name: &'static str, change: impl FnOnce(&mut SegmentSettings, &mut Valley
         refill_edges: 2.5,
         join_reach_edges: 6.0,
         sand_delay_edges: 1.5,
+        valley_depth: 0.03,
+        second_depth: 0.15,
+        second_passes: 3,
+        second_seed_triangles: 2.0,
+        bridge_edges: 0.5,
+        seed_share: 2.0,
         ..ValleySettings::default()
     };
     change(&mut segment, &mut valleys);
@@ -54,6 +61,11 @@ fn all_hows() -> Vec<How> {
         }),
         how("narrow grains", |s, _| s.max_grain_m = 0.3),
         how("no limit", |s, _| s.max_grain_m = 0.0),
+        how("no second look", |_, v| v.second_passes = 0),
+        how("the second look finds most", |_, v| {
+            (v.seed_share, v.second_seed_share, v.growth_edges, v.second_depth) = (1.0, 0.05, 2.0, 0.3);
+            v.stone_score = -10.0;
+        }),
         how("tiny seeds, plain smoothing", |s, v| {
             (s.min_grain_area_m2, v.seed_share, v.crease, v.valley_depth) = (0.002, 0.1, 10.0, 0.03);
         }),
@@ -77,6 +89,13 @@ fn every_setting_gives_the_same_catalogue_bit_for_bit_whatever_the_tiles_threads
     for (surface, random_tilings) in [(shuffled(&bed(1, 150, 120), 5), 3), (bed(2, 130, 100), 1)] {
         let reference = indexed(&surface, ONE_TILE);
         let expected: Vec<Catalogue> = all_hows().iter().map(|how| catalogue(&reference, how, ONE_TILE).0).collect();
+        let grains_of = |name: &str| {
+            let place = all_hows().iter().position(|how| how.0 == name).unwrap();
+            expected[place].grains.len()
+        };
+        let looks = ["no second look", "shorter reaches", "the second look finds most"].map(grains_of);
+        println!("{looks:?} grains without the second look, with it, and mostly from it");
+        assert!(looks[0] < looks[1] && 2 * looks[0] < looks[2], "{looks:?}");
         let mut tilings = vec![Tiling { tile_size_m: 0.25, threads: 3, memory_bytes: 1 }];
         for i in 0..random_tilings {
             let (threads, memory_bytes) = [(1, 1 << 30), (3, 1)][i % 2];
@@ -104,6 +123,46 @@ fn every_setting_gives_the_same_catalogue_bit_for_bit_whatever_the_tiles_threads
     println!("{grains} grains, {joined} in pieces, {wide} wider than a core; {attempts} attempts, {tiles} tiles");
     assert!(grains > 1000 && joined > 20 && wide > 10, "{grains} grains, {joined} in pieces, {wide} wide");
     assert!(attempts > 1 && tiles > 60, "{attempts} attempts, {tiles} tiles");
+}
+
+/// Three domes of a metre side by side, the middle one so rough that most of it counts as valley.
+fn domes(rough: bool) -> MemorySurface {
+    let n = 140;
+    let mut surface = MemorySurface::default();
+    let mut rng = Rng(3);
+    for j in 0..=n {
+        for i in 0..=n {
+            let mut place = |k: usize| (k as f64 + rng.within(-0.2, 0.2)) / n as f64 - 0.5;
+            let (x, y) = (place(i), place(j));
+            let from = [-0.33, 0.0, 0.33].map(|centre| (x - centre).powi(2) + y * y);
+            let top = -2.0 * from[0].min(from[1]).min(from[2]);
+            let waves = [[1.0, 0.0], [0.5, 0.866], [0.5, -0.866]].map(|[u, v]| (200.0 * (u * x + v * y)).sin());
+            let rise = 0.004 * (waves.iter().sum::<f64>() + rng.within(-1.0, 1.0));
+            let is_rough = rough && from[1] < from[0].min(from[2]);
+            surface.positions.push(DVec3::new(x, y, top + if is_rough { rise } else { 0.0 }));
+        }
+    }
+    let at = |i: usize, j: usize| (j * (n + 1) + i) as u64;
+    for (i, j) in (0..n).flat_map(|j| (0..n).map(move |i| (i, j))) {
+        let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+        surface.triangles.extend([[a, b, c], [a, c, d]]);
+    }
+    surface
+}
+
+#[test]
+fn the_second_look_finds_a_rough_dome_between_two_smooth_ones_and_changes_nothing_where_all_are_smooth() {
+    let found = |surface: &MemorySurface, second_passes: u32| {
+        let segment = SegmentSettings { min_grain_area_m2: 0.02, ..SegmentSettings::default() };
+        let how = ("domes", segment, ValleySettings { second_passes, ..ValleySettings::default() });
+        catalogue(&indexed(surface, ONE_TILE), &how, ONE_TILE).0
+    };
+    let wide = |catalogue: &Catalogue| catalogue.grains.iter().filter(|g| g.grain.surface_area_m2 > 0.2).count();
+    let (rough, smooth) = (domes(true), domes(false));
+    assert_eq!([0, 12].map(|passes| wide(&found(&rough, passes))), [2, 3]);
+    let [without, with] = [0, 12].map(|passes| found(&smooth, passes));
+    assert_eq!(wide(&with), 3);
+    assert_same(&without, &with, "smooth domes");
 }
 
 /// Halos as thin as they come: most of a tile is unknown, and the little that it claims to know must be so. Every grain of
@@ -149,7 +208,8 @@ fn what_a_tile_with_a_thin_halo_publishes_is_true_and_what_it_does_not_is_named(
         }
     }
     println!(
-        "{settled} of 1080 tiles settled, with {owned} grains; in the others {early} are found at once, {later_on} not"
+        "{settled} of {} tiles settled, with {owned} grains; in the others {early} are found at once, {later_on} not",
+        90 * all_hows().len()
     );
     assert!(settled > 50 && owned > 20 && early > 30 && later_on > 50, "{settled} {owned} {early} {later_on}");
 }

@@ -84,7 +84,9 @@ fn write_survey(f: &mut Formatter<'_>, survey: &SurveyFigures, files: usize) -> 
     row(f, "a valley is", format!("a hollow that bends more sharply than a radius of {valley} (valley_depth)"))?;
     row(f, "bridges cut", format!("between stones, up to a width of {} (bridge_edges)", length(l.widest_bridge_m)))?;
     let smoothed = length(l.smoothed_m);
-    row(f, "relief smoothed", format!("on a stone, where it is finer than {smoothed} (normal_passes, crease)"))?;
+    let again = length(l.smoothed_again_m);
+    row(f, "relief smoothed", format!("on a stone, where it is finer than {smoothed} (normal_passes, crease);"))?;
+    row(f, "", format!("where no stone is found then, finer than {again} (second_passes)"))?;
     row(f, "growth", format!("up to {} into the valleys around a stone (growth_edges)", length(l.growth_m)))?;
     row(f, "patches joined", format!("over gaps of up to {} (join_reach_edges)", length(l.widest_gap_m)))?;
     let needs = &survey.needs;

@@ -86,6 +86,8 @@ pub struct ValleyLengths {
     pub widest_bridge_m: f64,
     /// Width over which normals are smoothed, metres: what is finer is taken for noise.
     pub smoothed_m: f64,
+    /// The same for the second look, at what nothing claimed, metres.
+    pub smoothed_again_m: f64,
     /// How far stones grow into the valleys around them, metres.
     pub growth_m: f64,
     /// Widest gap between patches of one stone, metres.
@@ -95,11 +97,13 @@ pub struct ValleyLengths {
 impl ValleyLengths {
     fn new(mean_edge_m: f64) -> ValleyLengths {
         let v = ValleySettings::default();
+        // Each pass is a step of about one edge to a random side.
+        let smoothed_m = |passes: u32| 2.0 * f64::from(passes).sqrt() * mean_edge_m;
         ValleyLengths {
             bluntest_valley_m: mean_edge_m / v.valley_depth,
             widest_bridge_m: 2.0 * v.bridge_edges * mean_edge_m,
-            // Each pass is a step of about one edge to a random side.
-            smoothed_m: 2.0 * f64::from(v.normal_passes).sqrt() * mean_edge_m,
+            smoothed_m: smoothed_m(v.normal_passes),
+            smoothed_again_m: smoothed_m(v.second_passes),
             growth_m: v.growth_edges * mean_edge_m,
             widest_gap_m: v.join_reach_edges * mean_edge_m,
         }

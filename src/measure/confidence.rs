@@ -1,6 +1,6 @@
 //! Confidence: how likely a grain and one stone have half in common.
 //!
-//! A logistic regression on four figures that have no scale, fitted to 464 grains of five made-up scenes with known stones
+//! A logistic regression on four figures that have no scale, fitted to 495 grains of five made-up scenes with known stones
 //! (sandboxes, packed and coarse beds, sharp and blurred). A grain was right if it and a stone overlap by half of their
 //! joint surface. Fitted to four of the scenes, it says of the fifth what is so: see `benches/accuracy.md`.
 
@@ -8,15 +8,15 @@ use super::grain::Grain;
 use super::shape::hull_sphericity;
 
 /// Log odds where all figures are 0.
-const NONE: f64 = -10.58;
+const NONE: f64 = -13.80;
 /// Of the natural logarithm of the number of triangles: size against resolution.
-const TRIANGLES: f64 = 0.93;
+const TRIANGLES: f64 = 1.12;
 /// Of the sphericity of the hull: defects of shape.
-const SPHERICITY: f64 = 6.56;
+const SPHERICITY: f64 = 7.25;
 /// Of the share that lies away from valleys: exposure.
-const CORE: f64 = 5.52;
+const CORE: f64 = 7.63;
 /// Of the share of the border where nothing bounds it: its sharpness.
-const FREE: f64 = -4.44;
+const FREE: f64 = -4.22;
 
 /// Chance that a grain and one stone overlap by half or more of their joint visible surface, 0 to 1; none where the
 /// method gives no evidence, or the grain has no hull.

@@ -18,7 +18,8 @@ pub struct ValleySettings {
     pub valley_depth: f64,
     /// Bridges between stones narrower than twice this are cut, mean edge lengths, 0 to 10.
     pub bridge_edges: f64,
-    /// Smallest seed of a stone, as a share of the smallest grain, 0.01 to 1: less finds small exposures, and more noise.
+    /// Smallest seed of a stone, as a share of what cutting bridges leaves of a disc of the smallest grain's area, 0.01 to 2: less
+    /// finds small exposures, and more noise.
     pub seed_share: f64,
     /// How far a seed takes back what was cut off around it, mean edge lengths, 0 to 50.
     pub refill_edges: f64,
@@ -43,26 +44,39 @@ pub struct ValleySettings {
     pub join_rise: f64,
     /// and if other cores reach into that hull with less than this share of the smaller one's area, 0 to 10.
     pub join_swallowed: f64,
+    /// Times that normals are smoothed before a second look at what nothing claimed, 0 to 40; 0: no second look. Stones in
+    /// deep gaps, which few cameras saw, are too rough for the first.
+    pub second_passes: u32,
+    /// `valley_depth` of the second look, 0.01 to 0.5.
+    pub second_depth: f64,
+    /// Smallest seed of the second look as a share of that of the first, 0.01 to 1,
+    pub second_seed_share: f64,
+    /// and the smallest seed of it in mean triangles, 0 to 100,000.
+    pub second_seed_triangles: f64,
 }
 
 impl Default for ValleySettings {
     fn default() -> Self {
         ValleySettings {
-            normal_passes: 6,
+            normal_passes: 5,
             crease: 0.2,
             valley_depth: 0.06,
             bridge_edges: 1.25,
-            seed_share: 0.4,
-            refill_edges: 4.0,
-            growth_edges: 10.0,
-            valley_cost: 4.0,
-            overhang_cost: 8.0,
+            seed_share: 1.4,
+            refill_edges: 3.0,
+            growth_edges: 9.0,
+            valley_cost: 3.5,
+            overhang_cost: 7.0,
             sand_delay_edges: 4.0,
             stone_score: 0.6,
             join_reach: 1.65,
             join_reach_edges: 32.0,
             join_rise: 0.02,
             join_swallowed: 0.1,
+            second_passes: 12,
+            second_depth: 0.08,
+            second_seed_share: 0.15,
+            second_seed_triangles: 60.0,
         }
     }
 }
@@ -71,16 +85,15 @@ impl ValleySettings {
     /// How far the steps look beyond a body, mean edge lengths: the sum of their reaches. A ring of vertices is about
     /// one edge wide.
     pub fn reach_edges(&self) -> f64 {
-        f64::from(self.normal_passes + 2)
-            + self.bridge_edges
-            + self.refill_edges
-            + self.growth_edges
-            + self.join_reach_edges
+        let look = |passes: u32| f64::from(passes + 2) + self.bridge_edges + self.refill_edges + self.growth_edges;
+        let second = if self.second_passes > 0 { look(self.second_passes) } else { 0.0 };
+        look(self.normal_passes) + second + self.join_reach_edges
     }
 
     /// Checks every value against its range.
     pub(super) fn check(&self) -> Result<(), SettingsError> {
         range("valleys.normal_passes", self.normal_passes, self.normal_passes <= 20, "must be at most 20 passes")?;
+        range("valleys.second_passes", self.second_passes, self.second_passes <= 40, "must be at most 40 passes")?;
         macro_rules! within {
             ($($key:ident $low:literal $high:literal;)*) => {
                 $(range(
@@ -95,7 +108,7 @@ impl ValleySettings {
             crease 0.05 10.0;
             valley_depth 0.01 0.5;
             bridge_edges 0.0 10.0;
-            seed_share 0.01 1.0;
+            seed_share 0.01 2.0;
             refill_edges 0.0 50.0;
             growth_edges 0.0 50.0;
             valley_cost 0.0 100.0;
@@ -106,6 +119,9 @@ impl ValleySettings {
             join_reach_edges 0.0 50.0;
             join_rise 0.0 1.0;
             join_swallowed 0.0 10.0;
+            second_depth 0.01 0.5;
+            second_seed_share 0.01 1.0;
+            second_seed_triangles 0.0 100000.0;
         }
         Ok(())
     }

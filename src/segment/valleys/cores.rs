@@ -2,11 +2,11 @@
 
 use super::bend::Bend;
 use super::flood::{FAR, Flood, parts};
+use super::look::Look;
 use super::neighbours::Neighbours;
 use super::{NONE, UNKNOWN};
 use crate::geometry::DVec3;
 use crate::segment::components::Forest;
-use crate::settings::ValleySettings;
 use glam::Vec3A;
 use rayon::prelude::*;
 
@@ -33,8 +33,8 @@ pub struct Ground<'g> {
 
 impl Ground<'_> {
     /// Whether a vertex lies in a valley, or at an edge that spans a gap.
-    fn divides(&self, v: usize, settings: &ValleySettings) -> bool {
-        f64::from(self.bends[v].least) < -settings.valley_depth || self.bends[v].gap
+    fn divides(&self, v: usize, look: &Look) -> bool {
+        f64::from(self.bends[v].least) < -look.valley_depth || self.bends[v].gap
     }
 
     /// Whether the bending of a vertex is not known.
@@ -63,13 +63,13 @@ impl Cores {
     /// Vertices further than `bridge_edges` from all valleys and edges of the mesh hang together in seeds, so that
     /// narrow bridges between stones are cut. A seed of at least `seed_area_m2` is a core, and takes what lies within
     /// `refill_edges` of it, on its side of the valleys.
-    pub fn of(ground: &Ground, settings: &ValleySettings, seed_area_m2: f64) -> Cores {
+    pub fn of(ground: &Ground, look: &Look) -> Cores {
         let neighbours = ground.neighbours;
         let vertices = neighbours.len();
         let divides: Vec<bool> =
-            (0..vertices).into_par_iter().with_min_len(1 << 12).map(|v| ground.divides(v, settings)).collect();
+            (0..vertices).into_par_iter().with_min_len(1 << 12).map(|v| ground.divides(v, look)).collect();
         let length = |a: usize, b: usize| Some(parts(ground.edges(a, b)));
-        let bridge = parts(settings.bridge_edges) as u16;
+        let bridge = parts(look.bridge_edges) as u16;
         let shore = Flood::from(
             neighbours,
             |v| (!ground.is_unknown(v) && (divides[v] || neighbours.at_mesh_edge(v))).then_some(0),
@@ -90,7 +90,7 @@ impl Cores {
         let open = beside_unknown(neighbours, &of, count);
         let mut kept = 0;
         let fate: Vec<u32> = (0..count)
-            .map(|seed| match (area_m2[seed] >= seed_area_m2, open[seed]) {
+            .map(|seed| match (area_m2[seed] >= look.seed_area_m2, open[seed]) {
                 (true, _) => {
                     kept += 1;
                     kept - 1
@@ -101,7 +101,7 @@ impl Cores {
             .collect();
         of.par_iter_mut().filter(|seed| **seed < UNKNOWN).for_each(|seed| *seed = fate[*seed as usize]);
         drop((shore, doubt));
-        let reach = parts(settings.refill_edges) as u16;
+        let reach = parts(look.refill_edges) as u16;
         let start = |v: usize| (of[v] < UNKNOWN).then_some(0);
         let passable = |a: usize, b: usize| (!divides[b] || ground.is_unknown(b)).then(|| parts(ground.edges(a, b)));
         let of = spread(ground, (&start, &|v| of[v] == UNKNOWN, &|v| of[v]), reach, passable);

@@ -2,7 +2,7 @@
 
 use super::cores::{Ground, spread};
 use super::flood::parts;
-use super::judge::Kind;
+use super::judge::{Judged, Kind};
 use super::{NONE, UNKNOWN};
 use crate::settings::ValleySettings;
 
@@ -11,7 +11,7 @@ use crate::settings::ValleySettings;
 /// Steps are longer in valleys, so that what grows from two sides meets at the deepest line, and where
 /// the surface faces down, as membranes do that a reconstruction spans over what no camera saw. What is no stone starts late: sand lies at the foot
 /// of stones, not on their flanks.
-pub fn grow(ground: &Ground, cores: &[u32], kinds: &[Kind], settings: &ValleySettings) -> Vec<u32> {
+pub fn grow(ground: &Ground, cores: &[u32], judged: &[Judged], settings: &ValleySettings) -> Vec<u32> {
     let slowness: Vec<f32> = (0..cores.len())
         .map(|v| {
             // What is not known is taken for as fast as can be: what is in doubt must not come later than it might.
@@ -28,7 +28,7 @@ pub fn grow(ground: &Ground, cores: &[u32], kinds: &[Kind], settings: &ValleySet
     let late = (parts(settings.sand_delay_edges) as u16).min(reach);
     let start = |v: usize| match cores[v] {
         core if core >= UNKNOWN => None,
-        core => match kinds[core as usize] {
+        core => match judged[core as usize].kind {
             Kind::Open => None,
             Kind::Stone => Some(0),
             Kind::Fragment | Kind::Sheet => Some(late),
@@ -37,7 +37,7 @@ pub fn grow(ground: &Ground, cores: &[u32], kinds: &[Kind], settings: &ValleySet
     let doubtful = |v: usize| match cores[v] {
         UNKNOWN => true,
         NONE => false,
-        core => kinds[core as usize] == Kind::Open,
+        core => judged[core as usize].kind == Kind::Open,
     };
     spread(ground, (&start, &doubtful, &|v| cores[v]), reach, uphill)
 }

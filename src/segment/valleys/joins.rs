@@ -20,8 +20,6 @@ pub struct Joined {
     pub known: Vec<bool>,
 }
 
-/// Vertices of a core that are compared, at most.
-const SAMPLE: usize = 150;
 /// Of two cores, what lies no further beyond the gap than this, as a share of the square root of the smaller one's
 /// area, must agree by itself.
 const RIM: f64 = 0.3;
@@ -34,7 +32,6 @@ pub fn join(ground: &Ground, cores: &[u32], judged: &[Judged], seen: &PlanBox, s
     let sure = Sure::of(ground, cores, seen);
     let blocks = Blocks::of(ground, judged);
     let may = |core: usize| matches!(judged[core].kind, Kind::Stone | Kind::Fragment | Kind::Open);
-    let patches: Vec<Patch> = judged.par_iter().map(|core| Patch::of(ground, core)).collect();
     let farthest = |core: usize| reach_m(ground, judged[core].area_m2, settings);
     let mut order: Vec<usize> = (0..judged.len()).filter(|&core| may(core)).collect();
     order.sort_by(|&a, &b| judged[a].bounds.min[0].total_cmp(&judged[b].bounds.min[0]).then(a.cmp(&b)));
@@ -46,7 +43,7 @@ pub fn join(ground: &Ground, cores: &[u32], judged: &[Judged], seen: &PlanBox, s
             let ahead = order[place + 1..]
                 .iter()
                 .take_while(move |&&other| judged[other].bounds.min[0] <= judged[first].bounds.max[0] + widest_m);
-            let (patches, sure, farthest, blocks) = (&patches, &sure, &farthest, &blocks);
+            let (sure, farthest, blocks) = (&sure, &farthest, &blocks);
             ahead.filter_map(move |&other| {
                 let (a, b) = (first.min(other), first.max(other));
                 // Of a core that is not whole the reach is not known, but it is not more than that of the other.
@@ -66,7 +63,7 @@ pub fn join(ground: &Ground, cores: &[u32], judged: &[Judged], seen: &PlanBox, s
                 if [a, b].iter().all(|&core| judged[core].kind == Kind::Fragment) {
                     return None;
                 }
-                let pair = [(&judged[a], &patches[a]), (&judged[b], &patches[b])];
+                let pair = [&judged[a], &judged[b]];
                 one(ground, (blocks, [a, b]), pair, (gap_m, sure), settings).map(|one| (a, b, one))
             })
         })
@@ -100,67 +97,16 @@ fn grown(bounds: &PlanBox, by_m: f64) -> PlanBox {
     PlanBox { min: bounds.min.map(|low| low - by_m), max: bounds.max.map(|high| high + by_m) }
 }
 
-/// A sample of a core: places and normals, in the order of the vertices.
-struct Patch {
-    points: Vec<DVec3>,
-    normals: Vec<DVec3>,
-}
-
-impl Patch {
-    fn of(ground: &Ground, core: &Judged) -> Patch {
-        let vertices = || core.vertices.iter().step_by(core.vertices.len().div_ceil(SAMPLE).max(1));
-        Patch {
-            points: vertices().map(|&v| ground.positions[v as usize]).collect(),
-            normals: vertices().map(|&v| ground.normals[v as usize].as_dvec3()).collect(),
-        }
-    }
-
-    /// How far each point lies from the nearest of another patch, and each of that from the nearest of this one, m.
-    fn gaps_m(&self, other: &Patch) -> [Vec<f64>; 2] {
-        let mut theirs = vec![f64::INFINITY; other.points.len()];
-        let mut ours = Vec::with_capacity(self.points.len());
-        for p in &self.points {
-            let mut nearest = f64::INFINITY;
-            for (q, theirs) in other.points.iter().zip(&mut theirs) {
-                let squared = (*q - *p).length_squared();
-                nearest = nearest.min(squared);
-                *theirs = theirs.min(squared);
-            }
-            ours.push(nearest.sqrt());
-        }
-        theirs.iter_mut().for_each(|squared| *squared = squared.sqrt());
-        [ours, theirs]
-    }
-
-    /// Whether the points of another patch rise, in the mean, less steeply than `most` over the tangent planes of those of
-    /// this one's points that have a gap no wider: the mean of the sines, where what lies below counts 0.
-    fn rises_less(&self, gaps_m: &[f64], widest_m: f64, other: &Patch, most: f64) -> bool {
-        let near = || self.points.iter().zip(&self.normals).zip(gaps_m).filter(|(_, gap)| **gap <= widest_m);
-        // No term is below 0, so that what is too much can be told early.
-        let enough = most * (near().count() * other.points.len()) as f64;
-        let mut sum = 0.0;
-        for ((p, normal), _) in near() {
-            for q in &other.points {
-                let way = *q - *p;
-                sum += (way.dot(*normal) / way.length().max(f64::MIN_POSITIVE)).max(0.0);
-            }
-            if sum >= enough {
-                return false;
-            }
-        }
-        sum < enough
-    }
-}
-
 /// Whether two whole cores are one; none where they are too far apart, nothing where that hangs on what is not in sight.
 #[allow(clippy::type_complexity, reason = "each is named where it is used")]
 fn one(
     ground: &Ground,
     (blocks, names): (&Blocks, [usize; 2]),
-    [(first, a), (second, b)]: [(&Judged, &Patch); 2],
+    [first, second]: [&Judged; 2],
     (farthest_m, sure): (f64, &Sure),
     settings: &ValleySettings,
 ) -> Option<Option<bool>> {
+    let [a, b] = [&first.patch, &second.patch];
     let gaps_m = a.gaps_m(b);
     let gap_m = gaps_m[0].iter().copied().fold(f64::INFINITY, f64::min);
     if gap_m > farthest_m {

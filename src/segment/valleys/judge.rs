@@ -1,8 +1,10 @@
 //! What a core is: a stone, a fragment that may be part of one, or a sheet that no grain is part of.
 
 use super::cores::{Cores, Ground};
+use super::look::Look;
+use super::patch::Patch;
 use crate::geometry::{DVec3, PlanBox, flatter_than, mean_depth};
-use crate::settings::{SegmentSettings, ValleySettings};
+use crate::settings::SegmentSettings;
 use rayon::prelude::*;
 
 /// What a core is.
@@ -29,6 +31,8 @@ pub struct Judged {
     pub area_m2: f64,
     /// Its box in plan.
     pub bounds: PlanBox,
+    /// Some of its places, with their normals as they were smoothed to find it.
+    pub patch: Patch,
 }
 
 /// Means over a core, weighted by area.
@@ -56,7 +60,7 @@ const PART: f64 = 0.3;
 /// The score of a core is the sphericity of its hull plus half its bulge, less for what is level and
 /// hollow: sheets of sand and membranes score low. A core wider than a grain may be is a sheet whatever else it
 /// is; of one that is not whole nothing else is known.
-pub fn judge(ground: &Ground, cores: &Cores, (segment, settings): (&SegmentSettings, &ValleySettings)) -> Vec<Judged> {
+pub fn judge(ground: &Ground, cores: &Cores, (segment, look): (&SegmentSettings, &Look)) -> Vec<Judged> {
     let too_wide = |bounds: &PlanBox| segment.max_grain_m > 0.0 && bounds.width_m() > segment.max_grain_m;
     cores
         .members()
@@ -69,9 +73,9 @@ pub fn judge(ground: &Ground, cores: &Cores, (segment, settings): (&SegmentSetti
             let kind = match () {
                 () if too_wide(&bounds) => Kind::Sheet,
                 () if open => Kind::Open,
-                () => kind(ground, &vertices, &means, settings),
+                () => kind(ground, &vertices, &means, look),
             };
-            Judged { kind, vertices, area_m2: means.area_m2, bounds }
+            Judged { kind, area_m2: means.area_m2, bounds, patch: Patch::of(ground, &vertices), vertices }
         })
         .collect()
 }
@@ -91,15 +95,15 @@ impl Means {
     }
 }
 
-fn kind(ground: &Ground, vertices: &[u32], means: &Means, settings: &ValleySettings) -> Kind {
+fn kind(ground: &Ground, vertices: &[u32], means: &Means, look: &Look) -> Kind {
     // The sphericity that makes a score, which bounds of the hull mostly decide.
     let sphericity = |score: f64| score - BULGE * means.bulge;
-    if sphericity(settings.stone_score) <= 0.0 && means.up <= LEVEL {
+    if sphericity(look.stone_score) <= 0.0 && means.up <= LEVEL {
         return Kind::Stone;
     }
     let points: Vec<DVec3> = vertices.iter().map(|&v| ground.positions[v as usize]).collect();
     if means.up > LEVEL {
-        let least = sphericity(settings.stone_score);
+        let least = sphericity(look.stone_score);
         if least > 0.0 && flatter_than(&points, least) {
             return Kind::Sheet;
         }
@@ -108,7 +112,7 @@ fn kind(ground: &Ground, vertices: &[u32], means: &Means, settings: &ValleySetti
         return if hollow > 0.0 && flatter_than(&points, least + hollow) { Kind::Sheet } else { Kind::Stone };
     }
     match () {
-        () if !flatter_than(&points, sphericity(settings.stone_score)) => Kind::Stone,
+        () if !flatter_than(&points, sphericity(look.stone_score)) => Kind::Stone,
         () if !flatter_than(&points, sphericity(PART)) => Kind::Fragment,
         () => Kind::Sheet,
     }

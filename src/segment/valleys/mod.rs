@@ -8,6 +8,7 @@
 //! | cores: seeds take back what lies around them on their side of the valleys | [`cores`] | `refill_edges` |
 //! | what a core is: a stone, a fragment, or a sheet | [`mod@judge`] | a core |
 //! | growth up to the valley line, which is far where it is deep | [`growth`] | `growth_edges` |
+//! | all of this once more, smoothed more, on what nothing claimed | [`second`] | the same again, with `second_passes` |
 //! | cores of one stone joined, also across a gap | [`joins`] | `join_reach_edges`, and two cores |
 //! | grains: triangles by the majority of their vertices | [`settle`] | a grain |
 //!
@@ -27,8 +28,11 @@ pub mod growth;
 pub mod joins;
 pub mod judge;
 mod lanes;
+pub mod look;
 pub mod neighbours;
 pub mod normals;
+pub mod patch;
+pub mod second;
 pub mod settle;
 
 use super::bands::Bands;
@@ -44,9 +48,11 @@ use evidence::evidence;
 use fates::Fates;
 use growth::grow;
 use joins::join;
-use judge::{Kind, judge};
+use judge::judge;
+use look::Look;
 use neighbours::Neighbours;
 use normals::Normals;
+use second::look_again;
 
 /// No core, no grain.
 pub const NONE: u32 = u32::MAX;
@@ -60,13 +66,18 @@ pub fn segment_along_valleys(
     segment: &SegmentSettings,
     settings: &ValleySettings,
 ) -> Settled {
-    let bands = Bands::of(mesh);
-    let surface = Surface::of(mesh, &bands, scale, settings);
+    let smallest_m2 = smallest_grain_area_m2(scale, segment);
+    let first = Look::first(settings, smallest_m2, scale);
+    let surface = Surface::of(mesh, &Bands::of(mesh), scale, &first);
     let ground = surface.ground(mesh, scale);
-    let cores = Cores::of(&ground, settings, settings.seed_share * smallest_grain_area_m2(scale, segment));
-    let judged = judge(&ground, &cores, (segment, settings));
-    let kinds: Vec<Kind> = judged.iter().map(|core| core.kind).collect();
-    let grown = grow(&ground, &cores.of, &kinds, settings);
+    let mut cores = Cores::of(&ground, &first);
+    let mut judged = judge(&ground, &cores, (segment, &first));
+    let mut grown = grow(&ground, &cores.of, &judged, settings);
+    if let Some(look) = Look::second(settings, smallest_m2, scale)
+        && look_again((mesh, &surface), &grown, (&mut cores, &mut judged), (scale, segment, &look))
+    {
+        grown = grow(&ground, &cores.of, &judged, settings);
+    }
     let joined = join(&ground, &cores.of, &judged, mesh.seen.as_ref().unwrap_or(&PlanBox::EVERYWHERE), settings);
     let whole = whole(&surface.neighbours, &cores, &grown);
     let fates = Fates::of(&judged, &joined, whole, segment.max_grain_m);
@@ -88,7 +99,7 @@ fn whole(neighbours: &Neighbours, cores: &Cores, grown: &[u32]) -> Vec<bool> {
 }
 
 /// What the surface is like at every vertex.
-struct Surface {
+pub struct Surface {
     neighbours: Neighbours,
     normals: Normals,
     bends: Vec<Bend>,
@@ -96,12 +107,12 @@ struct Surface {
 }
 
 impl Surface {
-    fn of(mesh: &TileMesh, bands: &Bands, scale: &Scale, settings: &ValleySettings) -> Surface {
+    fn of(mesh: &TileMesh, bands: &Bands, scale: &Scale, look: &Look) -> Surface {
         let neighbours = Neighbours::of(bands);
         let mut normals = Normals::of(bands);
-        normals.smooth(&neighbours, settings.normal_passes, settings.crease as f32);
+        normals.smooth(&neighbours, look.normal_passes, look.crease as f32);
         let bends = bends(&mesh.positions, &neighbours, &normals, scale.mean_edge_m);
-        let unknown = within_rings_of_the_cut(mesh, &neighbours, settings.normal_passes + 1);
+        let unknown = within_rings_of_the_cut(mesh, &neighbours, look.normal_passes + 1);
         Surface { neighbours, normals, bends, unknown }
     }
 
