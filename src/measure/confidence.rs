@@ -8,15 +8,16 @@ use super::grain::Grain;
 use super::shape::hull_sphericity;
 
 /// Log odds where all figures are 0.
-const NONE: f64 = -13.80;
-/// Of the natural logarithm of the number of triangles: size against resolution.
-const TRIANGLES: f64 = 1.12;
+const NONE: f64 = -11.85;
+/// Of the natural logarithm of the number of triangles: size against resolution. Held here: 1.12 would fit no better to speak of, and
+/// trust hardly any grain of a coarse mesh, where all are of few triangles.
+const TRIANGLES: f64 = 0.70;
 /// Of the sphericity of the hull: defects of shape.
-const SPHERICITY: f64 = 7.25;
+const SPHERICITY: f64 = 7.84;
 /// Of the share that lies away from valleys: exposure.
-const CORE: f64 = 7.63;
+const CORE: f64 = 8.70;
 /// Of the share of the border where nothing bounds it: its sharpness.
-const FREE: f64 = -4.22;
+const FREE: f64 = -4.01;
 
 /// Chance that a grain and one stone overlap by half or more of their joint visible surface, 0 to 1; none where the
 /// method gives no evidence, or the grain has no hull.

@@ -16,7 +16,8 @@ use crate::store::StoreError;
 /// valleys instead of the divergence and what follows: neighbours of the vertices 17, normals, bends and areas 16, floods and
 /// labels 11; makes 70. Measured with 10 million in one tile: 68, and 74 to 78 along valleys. Something for growth comes on top;
 /// unknown triangles take up to 18 more each. What the second look along valleys looks at takes as much again: next to nothing
-/// on open beds, measured 3 to 20 for each of all triangles on crowded ones, and 50 if nothing is claimed at first.
+/// on open beds, measured 3 to 20 for each of all triangles on crowded ones, where the share of memory that tiles are not made for
+/// has room for it; 50 if nothing is claimed at first, for which nothing is set aside.
 pub const BYTES_PER_TRIANGLE: u64 = 96;
 
 /// A triangle and one of its sides must fit 32 bits.

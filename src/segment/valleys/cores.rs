@@ -90,7 +90,7 @@ impl Cores {
         let open = beside_unknown(neighbours, &of, count);
         let mut kept = 0;
         let fate: Vec<u32> = (0..count)
-            .map(|seed| match (area_m2[seed] >= look.seed_area_m2, open[seed]) {
+            .map(|seed| match (area_m2[seed] >= look.seed_area_m2.max(f64::MIN_POSITIVE), open[seed]) {
                 (true, _) => {
                     kept += 1;
                     kept - 1

@@ -27,11 +27,11 @@ pub struct Judged {
     pub kind: Kind,
     /// Its vertices, ascending.
     pub vertices: Vec<u32>,
-    /// Its area, m².
+    /// Its area as it was found, m²: of a core of the second look only triangles count all of whose corners were left over.
     pub area_m2: f64,
     /// Its box in plan.
     pub bounds: PlanBox,
-    /// Some of its places, with their normals as they were smoothed to find it.
+    /// Some of its places, with their normals as they were smoothed to find it; none where it is part of no grain, or not whole.
     pub patch: Patch,
 }
 
@@ -75,7 +75,9 @@ pub fn judge(ground: &Ground, cores: &Cores, (segment, look): (&SegmentSettings,
                 () if open => Kind::Open,
                 () => kind(ground, &vertices, &means, look),
             };
-            Judged { kind, area_m2: means.area_m2, bounds, patch: Patch::of(ground, &vertices), vertices }
+            let sampled: &[u32] = if matches!(kind, Kind::Stone | Kind::Fragment) { &vertices } else { &[] };
+            let patch = Patch::of(ground, sampled);
+            Judged { kind, area_m2: means.area_m2, bounds, patch, vertices }
         })
         .collect()
 }

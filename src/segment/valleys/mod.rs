@@ -18,6 +18,7 @@
 //! an unknown vertex as soon as from a known one is unknown as well. A core is whole if nothing unknown lies beside it.
 //! A grain is settled if all its cores are whole, nothing unknown lies beside what grew from them, and nothing unknown, nor
 //! a core that is not whole, lies where something could be joined to them. Then it is exactly the grain of the untiled run.
+//! The second look is cut where the first growth is in doubt: what lies beside that is to it what lies at the cut is to the first.
 
 pub mod bend;
 pub mod cores;
@@ -99,7 +100,7 @@ fn whole(neighbours: &Neighbours, cores: &Cores, grown: &[u32]) -> Vec<bool> {
 }
 
 /// What the surface is like at every vertex.
-pub struct Surface {
+pub(super) struct Surface {
     neighbours: Neighbours,
     normals: Normals,
     bends: Vec<Bend>,

@@ -28,7 +28,7 @@ struct Left {
 
 /// Adds to the cores of a first look, from which `grown` grew, those that are found in what it left over; tells whether it
 /// found any, or might have.
-pub fn look_again(
+pub(super) fn look_again(
     (mesh, surface): (&TileMesh, &Surface),
     grown: &[u32],
     (cores, judged): (&mut Cores, &mut Vec<Judged>),
