@@ -34,12 +34,13 @@ pub(super) fn look_again(
     (cores, judged): (&mut Cores, &mut Vec<Judged>),
     (scale, segment, look): (&Scale, &SegmentSettings, &Look),
 ) -> bool {
-    let left = Left::of(mesh, surface, grown);
+    let vertices = left_over(surface, grown);
     let may_hold = |v: &u32| f64::from(surface.normals.area_m2[*v as usize]);
     let in_doubt = surface.unknown.is_some();
-    if !in_doubt && left.vertices.iter().map(may_hold).sum::<f64>() < look.seed_area_m2 {
+    if !in_doubt && vertices.iter().map(may_hold).sum::<f64>() < look.seed_area_m2 {
         return false;
     }
+    let left = Left::of(mesh, &surface.neighbours, grown, vertices);
     let found_on = Surface::of(&left.mesh, &Bands::of(&left.mesh), scale, look);
     let ground = found_on.ground(&left.mesh, scale);
     let found = Cores::of(&ground, look);
@@ -63,9 +64,7 @@ pub(super) fn look_again(
 }
 
 impl Left {
-    fn of(mesh: &TileMesh, surface: &Surface, grown: &[u32]) -> Left {
-        let is_left = |v: usize| grown[v] == NONE && surface.normals.unit[v].z > DOWN;
-        let vertices: Vec<u32> = (0..grown.len()).into_par_iter().filter(|&v| is_left(v)).map(|v| v as u32).collect();
+    fn of(mesh: &TileMesh, neighbours: &Neighbours, grown: &[u32], vertices: Vec<u32>) -> Left {
         if vertices.is_empty() {
             return Left { vertices, mesh: TileMesh::default() };
         }
@@ -78,9 +77,15 @@ impl Left {
             .filter(|corners| corners.iter().all(|&v| v != NONE))
             .collect();
         let positions: Vec<DVec3> = vertices.iter().map(|&v| mesh.positions[v as usize]).collect();
-        let complete = vertices.iter().map(|&v| is_complete(mesh, &surface.neighbours, grown, v as usize)).collect();
+        let complete = vertices.iter().map(|&v| is_complete(mesh, neighbours, grown, v as usize)).collect();
         Left { mesh: TileMesh { positions, complete, triangles, ..TileMesh::default() }, vertices }
     }
+}
+
+/// The vertices that surely nothing claimed, and that do not face down, ascending.
+fn left_over(surface: &Surface, grown: &[u32]) -> Vec<u32> {
+    let is_left = |v: usize| grown[v] == NONE && surface.normals.unit[v].z > DOWN;
+    (0..grown.len()).into_par_iter().filter(|&v| is_left(v)).map(|v| v as u32).collect()
 }
 
 /// Whether of all triangles around a vertex it is known which of their corners are left over.
