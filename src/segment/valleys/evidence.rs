@@ -18,8 +18,9 @@ struct Sums {
     cores: u32,
 }
 
-/// The evidence for each grain, of the surface as the first look smoothed it, also where the second found the grain, by its lowest core. `grown` is the core that each vertex grew from. Means are of no
-/// meaning for a grain that is not known.
+/// The evidence for each grain, by its lowest core. `grown` is the core that each vertex grew from. Bending is that of the
+/// surface as the first look smoothed it, also where the second look found the grain. Means are of no meaning for a grain
+/// that is not known.
 pub fn evidence(ground: &Ground, grown: &[u32], judged: &[Judged], fates: &Fates) -> Vec<Evidence> {
     let grain = |v: usize| match grown[v] {
         core if core >= UNKNOWN => core,
