@@ -3,6 +3,7 @@
 //! Counting every grain of an area is *area-by-number*; a Wolman count on a grid is *grid-by-number*.
 //! Both are given, and every name says which it is.
 
+mod cover;
 mod grid;
 pub mod percentiles;
 mod raster;

@@ -52,8 +52,10 @@ pub struct Summary {
     pub survey_height_m: f64,
     /// Area of the survey's box in plan.
     pub survey_box_area_m2: f64,
-    /// Summed area of the grains' outlines in plan.
+    /// Summed area of the grains' outlines in plan, which overlap where stones lean over others.
     pub grain_footprint_area_m2: f64,
+    /// Area in plan under at least one outline.
+    pub grain_covered_area_m2: f64,
     /// The same over the survey's box, which may hold places without survey.
     pub grain_cover_of_survey_box: Option<f64>,
     /// Smallest visible surface of a grain that was counted: all sizes are truncated there.
@@ -81,8 +83,14 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// The summary of a catalogue. `smallest_grain_area_m2` is the limit that was held against the grains.
-    pub fn new(catalogue: &Catalogue, settings: &Settings, scale: &Scale, smallest_grain_area_m2: f64) -> Summary {
+    /// The summary of a catalogue. `smallest_grain_area_m2` is the limit that was held against the grains,
+    /// `covered_area_m2` the area in plan under at least one of their outlines.
+    pub fn new(
+        catalogue: &Catalogue,
+        settings: &Settings,
+        scale: &Scale,
+        (smallest_grain_area_m2, covered_area_m2): (f64, f64),
+    ) -> Summary {
         let grains = &catalogue.grains;
         let sizes = |axis: usize| Sizes::new(grains.iter().map(|g| g.grain.axes_m[axis]));
         let b = sizes(1);
@@ -107,7 +115,8 @@ impl Summary {
             survey_height_m: size.y,
             survey_box_area_m2: box_area,
             grain_footprint_area_m2: footprint,
-            grain_cover_of_survey_box: Some(footprint / box_area).filter(|c| c.is_finite()),
+            grain_covered_area_m2: covered_area_m2,
+            grain_cover_of_survey_box: Some(covered_area_m2 / box_area).filter(|c| c.is_finite()),
             smallest_measurable_grain_area_m2: smallest_grain_area_m2,
             smallest_measurable_grain_diameter_m: 2.0 * (smallest_grain_area_m2 / PI).sqrt(),
             b_axis_area_by_number: BAxis::new(

@@ -106,7 +106,8 @@ pub(crate) fn write_unnamed(
         &results.settings.raster,
         results.surveyed,
     )?;
-    let summary = Summary::new(results.catalogue, results.settings, results.scale, results.smallest_grain_area_m2);
+    let areas_m2 = (results.smallest_grain_area_m2, raster.covered_area_m2);
+    let summary = Summary::new(results.catalogue, results.settings, results.scale, areas_m2);
     let names = results.names();
     let mut written = Vec::with_capacity(names.len());
     for &name in &names {

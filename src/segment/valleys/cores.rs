@@ -1,9 +1,10 @@
 //! Cores: what of a stone lies well away from all valleys, grown back to their rims.
 
 use super::bend::Bend;
-use super::flood::{FAR, Flood, parts};
+use super::flood::{Flood, parts};
 use super::look::Look;
 use super::neighbours::Neighbours;
+use super::spread::Spread;
 use super::{NONE, UNKNOWN};
 use crate::geometry::DVec3;
 use crate::segment::components::Forest;
@@ -104,7 +105,9 @@ impl Cores {
         let reach = parts(look.refill_edges) as u16;
         let start = |v: usize| (of[v] < UNKNOWN).then_some(0);
         let passable = |a: usize, b: usize| (!divides[b] || ground.is_unknown(b)).then(|| parts(ground.edges(a, b)));
-        let of = spread(ground, (&start, &|v| of[v] == UNKNOWN, &|v| of[v]), reach, passable);
+        let mut spread = Spread::over(ground);
+        spread.rise(ground.neighbours, (&start, &|v| of[v] == UNKNOWN), reach, passable);
+        let of = spread.labels(|v| of[v]);
         let open = beside_unknown(neighbours, &of, kept as usize);
         Cores { of, open }
     }
@@ -124,31 +127,6 @@ impl Cores {
         }
         members
     }
-}
-
-/// Where each vertex begins, which are in doubt, and the labels of those that begin.
-pub type Sources<'s> =
-    (&'s (dyn Fn(usize) -> Option<u16> + Sync), &'s (dyn Fn(usize) -> bool + Sync), &'s (dyn Fn(usize) -> u32 + Sync));
-
-/// Labels spread from the sources as far as `reach`, and meet where they are equally far. What could be reached from a
-/// vertex in doubt as soon as from a source is [`UNKNOWN`].
-pub fn spread(
-    ground: &Ground,
-    (start, in_doubt, label): Sources,
-    reach: u16,
-    cost: impl Fn(usize, usize) -> Option<u32> + Sync,
-) -> Vec<u32> {
-    let neighbours = ground.neighbours;
-    let known = Flood::from(neighbours, start, reach, &cost);
-    let doubt = ground.unknown.map(|_| Flood::from(neighbours, |v| in_doubt(v).then_some(0), reach, &cost));
-    let spread = |v: usize| {
-        let doubt = doubt.as_ref().map_or(FAR, |doubt| doubt.distance[v]);
-        match known.distance[v] {
-            distance if doubt <= distance && doubt != FAR => UNKNOWN,
-            _ => known.source(v).map_or(NONE, label),
-        }
-    };
-    (0..neighbours.len()).into_par_iter().with_min_len(1 << 12).map(spread).collect()
 }
 
 /// Which of so many labels lie beside an unknown vertex.

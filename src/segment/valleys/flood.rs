@@ -30,6 +30,11 @@ pub struct Flood {
 }
 
 impl Flood {
+    /// A flood that has no source yet, over so many vertices.
+    pub fn dry(vertices: usize) -> Flood {
+        Flood { distance: vec![FAR; vertices], by: vec![u32::MAX; vertices] }
+    }
+
     /// Floods as far as `reach` parts. `start` gives the distance with which a source begins; none for other vertices.
     /// `cost` gives the length of the step from a vertex to its
     /// neighbour; none where there is no way.
@@ -39,16 +44,29 @@ impl Flood {
         reach: u16,
         cost: impl Fn(usize, usize) -> Option<u32> + Sync,
     ) -> Flood {
-        let vertices = neighbours.len();
-        let mut flood = Flood { distance: vec![FAR; vertices], by: vec![u32::MAX; vertices] };
-        let bands = vertices.div_ceil(BAND);
+        let mut flood = Flood::dry(neighbours.len());
+        flood.rise(neighbours, start, reach, cost);
+        flood
+    }
+
+    /// Goes on from sources that are added to those of before, which `start` may give again. With the same `reach` and
+    /// `cost` it becomes what it would be if all had begun together: a distance is the least of all ways, and only what
+    /// a new source leads to sooner changes.
+    pub fn rise(
+        &mut self,
+        neighbours: &Neighbours,
+        start: impl Fn(usize) -> Option<u16> + Sync,
+        reach: u16,
+        cost: impl Fn(usize, usize) -> Option<u32> + Sync,
+    ) {
+        let bands = neighbours.len().div_ceil(BAND);
         let mut waiting: Vec<Vec<Step>> = (0..bands).map(|_| Vec::new()).collect();
         let mut first = true;
         while first || waiting.iter().any(|steps| !steps.is_empty()) {
-            let crossing: Vec<Vec<Step>> = flood
+            let crossing: Vec<Vec<Step>> = self
                 .distance
                 .par_chunks_mut(BAND)
-                .zip(flood.by.par_chunks_mut(BAND))
+                .zip(self.by.par_chunks_mut(BAND))
                 .zip(&waiting)
                 .enumerate()
                 .map(|(band, ((distance, by), steps))| {
@@ -64,7 +82,6 @@ impl Flood {
             crossing.into_iter().flatten().for_each(|step| waiting[step.to as usize / BAND].push(step));
             first = false;
         }
-        flood
     }
 
     /// Whether a vertex was reached.
@@ -124,7 +141,7 @@ impl Front<'_> {
                 self.levels.resize(1 + usize::from(self.reach), Vec::new());
             }
             self.levels[usize::from(distance)].push(to);
-        } else if distance == known && by < self.by[place] && self.by[place] != to {
+        } else if distance == known && self.by[place] != to && (by == to || by < self.by[place]) {
             self.by[place] = by;
         }
     }
@@ -173,7 +190,7 @@ mod tests {
             seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (seed >> 33) % n
         };
-        let (mut crossed, mut ties) = (0, 0);
+        let (mut crossed, mut ties, mut sooner) = (0, 0, 0);
         for _ in 0..300 {
             let (vertices, faces) = (4 + below(120), below(200));
             let mesh = TileMesh {
@@ -187,6 +204,11 @@ mod tests {
             let cost = |a: usize, b: usize| (b as u64 % 7 != closed).then_some(1 + ((a + b) % 3) as u32);
             let flood = Flood::from(&neighbours, start, reach, cost);
             let n = vertices as usize;
+            let mut later = Flood::from(&neighbours, |v| start(v).filter(|_| v as u64 % 5 < 3), reach, cost);
+            let earlier = later.distance.clone();
+            later.rise(&neighbours, start, reach, cost);
+            assert!(later.distance == flood.distance && later.by == flood.by, "sources that came later");
+            sooner += (0..n).filter(|&v| flood.distance[v] < earlier[v] && earlier[v] != FAR).count();
             let mut distance: Vec<u32> =
                 (0..n).map(|v| start(v).filter(|&d| d <= reach).map_or(u32::MAX, u32::from)).collect();
             loop {
@@ -226,5 +248,6 @@ mod tests {
             }
         }
         assert!(crossed > 1000 && ties > 1000, "{crossed} ways crossed bands, {ties} were not the only ones");
+        assert!(sooner > 1000, "only {sooner} were reached sooner from sources that came later");
     }
 }

@@ -35,6 +35,7 @@ pub mod normals;
 pub mod patch;
 pub mod second;
 pub mod settle;
+pub mod spread;
 
 use super::bands::Bands;
 use super::settle::Settled;
@@ -47,7 +48,7 @@ use bend::{Bend, bends};
 use cores::{Cores, Ground, beside_unknown};
 use evidence::evidence;
 use fates::Fates;
-use growth::grow;
+use growth::Growth;
 use joins::join;
 use judge::judge;
 use look::Look;
@@ -73,12 +74,14 @@ pub fn segment_along_valleys(
     let ground = surface.ground(mesh, scale);
     let mut cores = Cores::of(&ground, &first);
     let mut judged = judge(&ground, &cores, (segment, &first));
-    let mut grown = grow(&ground, &cores.of, &judged, settings);
+    let mut growth = Growth::over(&ground, settings);
+    let mut grown = growth.grow(&cores, &judged);
     if let Some(look) = Look::second(settings, smallest_m2, scale)
         && look_again((mesh, &surface), &grown, (&mut cores, &mut judged), (scale, segment, &look))
     {
-        grown = grow(&ground, &cores.of, &judged, settings);
+        grown = growth.grow(&cores, &judged);
     }
+    drop(growth);
     let joined = join(&ground, &cores.of, &judged, mesh.seen.as_ref().unwrap_or(&PlanBox::EVERYWHERE), settings);
     let whole = whole(&surface.neighbours, &cores, &grown);
     let fates = Fates::of(&judged, &joined, whole, segment.max_grain_m);
