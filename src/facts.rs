@@ -3,7 +3,8 @@
 use crate::index::{Index, Scale};
 use crate::open::Reach;
 use crate::pipeline::LostJob;
-use crate::settings::Settings;
+use crate::segment::smallest_grain_area_m2;
+use crate::settings::{SegmentSettings, Settings};
 use crate::stitch::Catalogue;
 use crate::tile::Plan;
 use crate::triangulate::DrapeFigures;
@@ -15,8 +16,13 @@ const LOOSE_SHARE: f64 = 0.9;
 const EDGE_SHARE: f64 = 0.9;
 
 /// What is odd about a result without being wrong, each with what to do.
-/// `left_out` grains had too little confidence.
-pub fn oddities(catalogue: &Catalogue, left_out: u64, scale: &Scale, settings: &Settings) -> Vec<String> {
+/// `left_out` grains had too little confidence; `of_cloud` says that the surface was made of points.
+pub fn oddities(
+    catalogue: &Catalogue,
+    (left_out, of_cloud): (u64, bool),
+    scale: &Scale,
+    settings: &Settings,
+) -> Vec<String> {
     let mut odd = Vec::new();
     let wider = catalogue.oversize.len();
     // Of a closed or open surface there are two triangles for each vertex; of loose ones, a third.
@@ -38,11 +44,26 @@ pub fn oddities(catalogue: &Catalogue, left_out: u64, scale: &Scale, settings: &
     let at_edges = catalogue.grains.iter().filter(|g| g.grain.touches_edge).count();
     if at_edges as f64 > EDGE_SHARE * catalogue.grains.len() as f64 {
         odd.push(format!(
-            "{at_edges} of {} grains touch an edge of the surface, so their sizes are lower bounds: the surface has many holes\nhelp: take them as such rather than leave them all out; a denser cloud, or a Poisson mesh of a cloud (CloudCompare, MeshLab), has fewer holes",
-            catalogue.grains.len()
+            "{at_edges} of {} grains touch an edge of the surface: the border of the survey, or a hole, as gaps between stones often are. What lies beyond is in none of their sizes\nhelp: do not leave them all out; {}",
+            catalogue.grains.len(),
+            match of_cloud {
+                true => "a Poisson mesh of the cloud (CloudCompare, MeshLab) has fewer holes",
+                false => "photographs from more sides leave fewer holes",
+            }
         ));
     }
     odd
+}
+
+/// What is said where the smallest grain that was asked for is smaller than the mesh can show; none where it is not.
+pub fn raised_limit(scale: &Scale, settings: &SegmentSettings) -> Option<String> {
+    let limit_m2 = smallest_grain_area_m2(scale, settings);
+    (limit_m2 > settings.min_grain_area_m2).then(|| {
+        format!(
+            "the smallest grain is {limit_m2:.2e} m², not {:e}: it takes {} mean triangles to tell one from noise (segment.min_grain_triangles)",
+            settings.min_grain_area_m2, settings.min_grain_triangles
+        )
+    })
 }
 
 /// What is odd about a cloud and what became of it, each with what to do.

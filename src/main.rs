@@ -84,6 +84,11 @@ fn run_command(args: &RunArgs) -> Result<ExitCode, Error> {
         outcome.segmented_per_triangle,
         outcome.curvature_per_triangle.map_or_else(String::new, |n| format!(", and {n:.2} looked at for curvature"))
     ));
+    if let Some([d16, d50, d84]) = outcome.b_axis_mm() {
+        progress.note(&format!(
+            "b axis, each grain counted once: D16 {d16:.1} mm, D50 {d50:.1} mm, D84 {d84:.1} mm; summary.json has more"
+        ));
+    }
     if outcome.lost.is_empty() {
         return Ok(ExitCode::Done);
     }
@@ -113,7 +118,7 @@ fn inspect_command(args: &InspectArgs) -> Result<ExitCode, Error> {
 
 fn settings_command(args: &SettingArgs) -> Result<ExitCode, Error> {
     let settings = args.settings()?;
-    print(&toml::to_string(&settings).expect("plain numbers and texts"));
+    print(&settings.printed());
     Ok(ExitCode::Done)
 }
 

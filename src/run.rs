@@ -5,7 +5,7 @@ use crate::curvature::InstructionSet;
 use crate::cuts::{GrainCores, grain_cores};
 use crate::divergence::Divergence;
 use crate::error::Error;
-use crate::facts::{facts, oddities, oddities_of_cloud};
+use crate::facts::{facts, oddities, oddities_of_cloud, raised_limit};
 use crate::forecast;
 use crate::index::{BuildRoom, Index};
 use crate::measure::Wanted;
@@ -17,7 +17,7 @@ use crate::progress::{Progress, Unit};
 use crate::resume::{ResumeError, WORK, WorkFolder, changes_since_finished, whole_identity};
 use crate::segment::smallest_grain_area_m2;
 use crate::settings::{Instructions, Method, Settings};
-use crate::statistics::RasterGrid;
+use crate::statistics::{RasterGrid, Sizes};
 use crate::stitch::{Catalogue, TileReport, leave_out, stitch};
 use crate::store::Shelf;
 use crate::surfaces::{WholeSurface, tell_of_weld};
@@ -60,6 +60,15 @@ pub struct Outcome {
     pub triangles: u64,
     /// What each stage cost.
     pub costs: Costs,
+}
+
+impl Outcome {
+    /// D16, D50 and D84 of the b axis, area-by-number, millimetres; none without grains.
+    pub fn b_axis_mm(&self) -> Option<[f64; 3]> {
+        let sizes = Sizes::new(self.catalogue.grains.iter().map(|g| 1e3 * g.grain.axes_m[1]));
+        let [d16, d50, d84] = [16.0, 50.0, 84.0].map(|percent| sizes.area_by_number(percent));
+        Some([d16?, d50?, d84?])
+    }
 }
 
 /// Whether a job that is to be resumed is done already: its results are there, from the same inputs and settings.
@@ -139,6 +148,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
         }
     };
 
+    raised_limit(&index.scale, &settings.segment).iter().for_each(|raised| progress.note(raised));
     let weld = work.weld_facts();
     warnings.extend(tell_of_weld(&reach, weld.as_ref(), progress));
 
@@ -207,7 +217,12 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
 
     // statistics and write
     let figures = work.figures();
-    let odd = figures.iter().flat_map(oddities_of_cloud).chain(oddities(&catalogue, left_out, &index.scale, settings));
+    let odd = figures.iter().flat_map(oddities_of_cloud).chain(oddities(
+        &catalogue,
+        (left_out, reach.is_cloud()),
+        &index.scale,
+        settings,
+    ));
     odd.for_each(|odd| {
         progress.warn(&odd);
         warnings.push(odd);
@@ -239,6 +254,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
         mesh: labelled.then_some(&mesh),
         cloud: settings.output.labelled_cloud.then_some(&reach),
     };
+    reach.check_unchanged()?;
     let files = crew.pool.install(|| write(&folder, &results, progress, control))?;
     if lost.is_empty() {
         drop((index, divergence, findings));

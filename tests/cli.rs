@@ -87,7 +87,7 @@ fn help_of_run_teaches_units_keys_files_and_examples() {
         "Examples:",
         "gravelometer run reach.ply",
         "Exit codes",
-        "does not depend on",
+        "do not depend on",
     ];
     for text in texts.into_iter().chain(OUTPUTS) {
         assert!(said.out.contains(text), "{text}: {}", said.out);

@@ -41,7 +41,7 @@ What is written to OUT:
   labelled_cloud.laz with --labelled-cloud: the input points with a grain_id for each, -1 in no grain (also for points
                      at the very place of another one); of one LAS file in its own coordinates, else on the map
 
-The result does not depend on --tile-size, --threads and --memory.";
+The grains do not depend on --tile-size, --threads and --memory, byte for byte; layer tiles of grains.gpkg and run.json say\nhow the work was cut.";
 
 /// Every pebble of a gravel river bed, from a 3D survey.
 #[derive(Debug, Parser)]
@@ -138,7 +138,8 @@ pub struct SettingArgs {
     /// default: 2]
     #[arg(long, value_name = "METRES", allow_negative_numbers = true, help_heading = "Grains")]
     pub max_grain: Option<f64>,
-    /// Smallest grain, m² of visible surface [segment.min_grain_area_m2; default: 1e-4]
+    /// Smallest grain, m² of visible surface; on a coarse mesh never less than 50 mean triangles
+    /// (segment.min_grain_triangles), which the run says [segment.min_grain_area_m2; default: 1e-4]
     #[arg(long, value_name = "M2", allow_negative_numbers = true, help_heading = "Grains")]
     pub min_grain_area: Option<f64>,
     /// Side of a tile's core, metres; 0: from the memory [work.tile_size_m; default: 0]
@@ -147,7 +148,7 @@ pub struct SettingArgs {
     /// Compute threads; 0: all cores [work.threads; default: 0]
     #[arg(long, value_name = "N", help_heading = "Work")]
     pub threads: Option<usize>,
-    /// Most memory to use, such as 2GiB [work.memory; default: half of what is there]
+    /// Most memory to use, such as 2GiB; 0: half of what is there [work.memory; default: 0]
     #[arg(long, value_name = "SIZE", help_heading = "Work")]
     pub memory: Option<String>,
     /// Also write the input mesh, or the surface of a cloud, with a grain_id for each face [output.labelled_mesh; default:

@@ -113,6 +113,9 @@ impl fmt::Display for Score {
             "false: {} on sand, {} further pieces of a stone; missed: {} merged with a neighbour",
             self.sand_grains, self.split_grains, self.merged_stones
         )?;
+        if self.ignored_grains > 0 {
+            writeln!(f, "not judged: {} on stones that show too little to count", self.ignored_grains)?;
+        }
         if let Some(error) = self.axis_error {
             let [a, b, c] = error.map(|e| 100.0 * e);
             writeln!(

@@ -131,8 +131,9 @@ fn length(metres: f64) -> String {
     }
 }
 
+/// In m², as `--min-grain-area` has it, and where that is little in mm² beside it.
 fn area(m2: f64) -> String {
-    if m2 >= 0.01 { format!("{m2:.3} m²") } else { format!("{:.3} mm²", m2 * 1e6) }
+    if m2 >= 0.01 { format!("{m2:.3} m²") } else { format!("{m2:.2e} m² ({:.3} mm²)", m2 * 1e6) }
 }
 
 fn bytes(bytes: u64) -> String {

@@ -136,6 +136,9 @@ pub fn inspect(paths: &[PathBuf], input: &InputSettings) -> Result<Inspection, O
     let files = reach.files().iter().zip(&sums).map(of_file).collect();
     let all = sums.iter().fold(Sums::default(), |a, &b| a.merge(b));
     let surface = figures(&all, reach.vertices(), reach.triangles());
+    if surface.surface_area_m2 <= 0.0 {
+        warnings.push(refused(&"the surface has no area at all: check the unit (--unit) and the export"));
+    }
     let counts = [reach.vertices(), reach.faces(), reach.triangles()];
     let mut needs = Needs::of(&reach, memory_there_bytes());
     let weld = match weld(&reach, input.weld_m, u64::MAX) {

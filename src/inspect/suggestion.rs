@@ -9,6 +9,10 @@ use crate::settings::{PRESETS, SegmentSettings, Settings, ValleySettings};
 use serde::Serialize;
 use std::f64::consts::PI;
 
+/// Where a preset is meant for meshes that are coarser, the smallest grain is a disc so many edges wide,
+const GRAIN_EDGES: f64 = 10.0;
+/// but no less than the smallest of the published method, m².
+const PUBLISHED_M2: f64 = 1e-4;
 /// Triangles that the smallest measurable grain needs.
 const SMALLEST_GRAIN_TRIANGLES: f64 = 50.0;
 
@@ -67,7 +71,8 @@ pub struct Suggestion {
     pub smallest_grain_diameter_m: f64,
     /// The settings file that suits.
     pub preset: Preset,
-    /// For `--min-grain-area`, m²: that of the preset, or the above, rounded up to two digits, where that is more.
+    /// For `--min-grain-area`, m²: that of the preset, or a disc of ten edges where the mesh is finer than the preset is meant for;
+    /// never less than the above, rounded up to two digits.
     pub min_grain_area_m2: f64,
     /// For `--max-grain`, metres.
     pub max_grain_m: f64,
@@ -116,11 +121,12 @@ impl Suggestion {
         let area = SMALLEST_GRAIN_TRIANGLES * surface.mean_triangle_area_m2;
         let preset = Preset::of(surface.mean_edge_m, has_colors);
         let limits = preset.limits();
+        let fine_m2 = round_up(PI / 4.0 * (GRAIN_EDGES * surface.mean_edge_m).powi(2)).max(PUBLISHED_M2);
         Suggestion {
             smallest_grain_area_m2: area,
             smallest_grain_diameter_m: (4.0 * area / PI).sqrt(),
             preset,
-            min_grain_area_m2: round_up(area).max(limits.min_grain_area_m2),
+            min_grain_area_m2: limits.min_grain_area_m2.min(fine_m2).max(round_up(area)),
             max_grain_m: limits.max_grain_m,
             coarse: surface.mean_edge_m > 0.030,
             lengths: ValleyLengths::new(surface.mean_edge_m),
@@ -163,6 +169,9 @@ mod tests {
             Suggestion::new(&surface, true).min_grain_area_m2
         };
         assert_eq!(suggested(0.0007), limits[0].min_grain_area_m2);
+        // Between the meshes that two presets are meant for there is no jump.
+        assert_eq!([0.00105, 0.002, 0.004, 0.006].map(suggested), [1e-4, 3.2e-4, limits[1].min_grain_area_m2, 2.9e-3]);
+        assert_eq!(suggested(0.012), limits[2].min_grain_area_m2);
         assert_eq!(suggested(0.04), 0.032);
     }
 

@@ -58,6 +58,12 @@ pub enum OpenError {
     #[error("{path}: is empty (0 bytes)\nhelp: the export or copy did not finish; export it again")]
     Empty { path: String },
 
+    /// Changed by another program while it was read.
+    #[error(
+        "{path}: was changed while it was read, so that results would be partly of the old file and partly of the new\nhelp: \
+         let what writes it end, then run again"
+    )]
+    Changed { path: String },
     /// The first line is not `ply`.
     #[error(
         "{path}: is not a PLY file: it starts with `{start}`, not with a line `ply`\nhelp: meshes are \
@@ -228,8 +234,9 @@ pub enum OpenError {
     LasHeader { path: String, reason: String },
     /// A scale or an offset that makes no coordinates.
     #[error(
-        "{path}: coordinates along {axis} have scale {scale:e} and offset {offset:e}, which makes no numbers of \
-         them\nhelp: the header is damaged; export the cloud again"
+        "{path}: coordinates along {axis} have scale {scale:e} and offset {offset:e}, which makes no places of \
+         them: a scale is above 0, and an offset not so large that steps of the scale are lost in it\nhelp: the header is \
+         damaged; export the cloud again"
     )]
     LasTransform { path: String, axis: char, scale: f64, offset: f64 },
     /// More or fewer points than declared.

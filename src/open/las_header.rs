@@ -294,7 +294,8 @@ fn check_transforms(source: Source<'_>, header: &raw::Header) -> Result<(), Open
     ];
     for (axis, scale, offset) in axes {
         let far = |raw: i32| (f64::from(raw) * scale + offset).is_finite();
-        if !scale.is_normal() || !far(i32::MIN) || !far(i32::MAX) {
+        let lost = offset + scale == offset;
+        if !scale.is_normal() || scale < 0.0 || lost || !far(i32::MIN) || !far(i32::MAX) {
             return Err(OpenError::LasTransform { path: source.path.to_owned(), axis, scale, offset });
         }
     }

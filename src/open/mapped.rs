@@ -9,7 +9,7 @@
 
 use super::error::OpenError;
 use memmap2::{Mmap, UncheckedAdvice};
-use std::fs::{self, File};
+use std::fs::{self, File, Metadata};
 use std::io::ErrorKind;
 use std::ops::Deref;
 use std::path::Path;
@@ -20,13 +20,32 @@ use std::time::UNIX_EPOCH;
 #[derive(Debug)]
 pub(super) struct MappedFile {
     map: Mmap,
-    modified_s: i64,
+    modified_ns: i64,
     /// Bytes passed since the pages were last let go.
     passed: AtomicU64,
 }
 
 /// Pages are let go after so many bytes: few enough not to count, enough to be cheap.
 const KEPT_BYTES: u64 = 32 << 20;
+
+/// Time of the last change, nanoseconds since 1970; 0 where the system does not tell.
+fn modified_ns(facts: &Metadata) -> i64 {
+    let since = facts.modified().ok().and_then(|t| t.duration_since(UNIX_EPOCH).ok());
+    since.map_or(0, |t| i64::try_from(t.as_nanos()).unwrap_or(i64::MAX))
+}
+
+/// Refuses a file that is not what it was when it had this length and this time of its last change.
+///
+/// # Errors
+/// It was changed, or is no longer there.
+pub(super) fn check_unchanged(path: &Path, bytes: u64, modified: i64) -> Result<(), OpenError> {
+    let unreadable = |source| OpenError::Unreadable { path: path.display().to_string(), source };
+    let facts = fs::metadata(path).map_err(unreadable)?;
+    if facts.len() != bytes || modified_ns(&facts) != modified {
+        return Err(OpenError::Changed { path: path.display().to_string() });
+    }
+    Ok(())
+}
 
 impl MappedFile {
     /// Maps a file for reading.
@@ -56,22 +75,18 @@ impl MappedFile {
         // That nobody truncates or rewrites the file meanwhile is the contract above, which no program can
         // enforce on Linux; every index into the slice is bounds-checked, so a breach cannot read outside it.
         let map = unsafe { Mmap::map(&file) }.map_err(unreadable)?;
-        let modified_s = facts
-            .modified()
-            .ok()
-            .and_then(|t| t.duration_since(UNIX_EPOCH).ok())
-            .map_or(0, |t| i64::try_from(t.as_secs()).unwrap_or(i64::MAX));
-        Ok(MappedFile { map, modified_s, passed: AtomicU64::new(0) })
+        let modified_ns = modified_ns(&facts);
+        Ok(MappedFile { map, modified_ns, passed: AtomicU64::new(0) })
     }
 
     /// Maps a scratch file without a name, which stands for a file that was changed at this time.
     ///
     /// # Errors
     /// The system refuses.
-    pub(super) fn of_scratch(file: &File, modified_s: i64) -> std::io::Result<MappedFile> {
+    pub(super) fn of_scratch(file: &File, modified_ns: i64) -> std::io::Result<MappedFile> {
         // SAFETY: as in `open`; a file without a name is nobody else's.
         let map = unsafe { Mmap::map(file) }?;
-        Ok(MappedFile { map, modified_s, passed: AtomicU64::new(0) })
+        Ok(MappedFile { map, modified_ns, passed: AtomicU64::new(0) })
     }
 
     /// Says that so many bytes were read and are not needed soon.
@@ -98,8 +113,8 @@ impl MappedFile {
     }
 
     /// Time of the last change, seconds since 1970; 0 where the file system does not tell.
-    pub(super) fn modified_s(&self) -> i64 {
-        self.modified_s
+    pub(super) fn modified_ns(&self) -> i64 {
+        self.modified_ns
     }
 }
 

@@ -5,7 +5,7 @@ use super::error::OpenError;
 use super::frame::Frame;
 use super::georeference::{Georeference, SideFiles};
 use super::las_crs::CloudCrs;
-use super::mapped::MappedFile;
+use super::mapped::{MappedFile, check_unchanged};
 use super::ply::PlyMesh;
 use super::precision::{check_not_degrees, check_precision};
 use super::progress::Progress;
@@ -92,6 +92,18 @@ impl Reach {
     /// Whether the files are point clouds, which have vertices and no triangles.
     pub fn is_cloud(&self) -> bool {
         self.triangles() == 0
+    }
+
+    /// Refuses what another program has changed since it was opened.
+    ///
+    /// # Errors
+    /// A file has another length or another time of its last change, or is no longer there.
+    pub fn check_unchanged(&self) -> Result<(), OpenError> {
+        let of_file = |file: &SurveyFile| {
+            let was = file.fingerprint();
+            check_unchanged(file.path(), was.bytes, was.modified_ns)
+        };
+        self.files().iter().try_for_each(of_file)
     }
 
     /// From input to local to map.

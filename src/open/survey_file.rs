@@ -12,8 +12,8 @@ use std::path::{Path, PathBuf};
 pub struct Fingerprint {
     /// Length, bytes.
     pub bytes: u64,
-    /// Time of the last change, seconds since 1970.
-    pub modified_s: i64,
+    /// Time of the last change, nanoseconds since 1970.
+    pub modified_ns: i64,
     /// FNV-1a (64 bit) of the first and the last 64 KiB.
     pub ends_fnv1a64: u64,
 }
@@ -22,10 +22,10 @@ pub struct Fingerprint {
 const END_BYTES: usize = 64 << 10;
 
 impl Fingerprint {
-    pub(super) fn of(bytes: &[u8], modified_s: i64) -> Fingerprint {
+    pub(super) fn of(bytes: &[u8], modified_ns: i64) -> Fingerprint {
         let end = bytes.len().min(END_BYTES);
         let hash = fnv1a64(fnv1a64(FNV_BASIS, &bytes[..end]), &bytes[bytes.len() - end..]);
-        Fingerprint { bytes: bytes.len() as u64, modified_s, ends_fnv1a64: hash }
+        Fingerprint { bytes: bytes.len() as u64, modified_ns, ends_fnv1a64: hash }
     }
 }
 

@@ -28,7 +28,7 @@ pub enum SettingsError {
         source: std::io::Error,
     },
     /// The text is not TOML, or holds an unknown key or a value of the wrong kind.
-    #[error("{origin}: {message}\nhelp: configs/default.toml lists every key with its unit")]
+    #[error("{origin}: {message}\nhelp: `gravelometer settings` prints every key with its unit and its default")]
     Parse {
         /// File or flag.
         origin: String,

@@ -4,6 +4,7 @@
 //! `configs/default.toml` is compared with [`Settings::default`] by a test.
 
 mod load;
+mod printed;
 mod unused;
 mod valleys;
 

@@ -26,7 +26,7 @@ struct Part<'c> {
 }
 
 /// Share of each cell that outlines cover, 0 to 1, row-major from the north-west.
-pub fn cover(catalogue: &Catalogue, frame: &Frame, grid: &RasterGrid) -> Vec<f64> {
+pub(super) fn cover(catalogue: &Catalogue, frame: &Frame, grid: &RasterGrid) -> Vec<f64> {
     let cells_per_step = frame.outline_step_m() / grid.cell_m;
     let shift = grid.corner_shift();
     let place = |p: &[i64; 2]| -> [f64; 2] { std::array::from_fn(|i| p[i] as f64 * cells_per_step + shift[i]) };

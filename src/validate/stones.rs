@@ -68,6 +68,7 @@ pub(super) fn read_stones(
     let (a, b, c) = (length("A")?, length("B")?, length("C")?);
     check_order(path, &table)?;
     let directions = directions(&table);
+    check_directions(path, directions.as_deref().unwrap_or_default())?;
     let optional = |name: &str, row: usize| table.column(name).and_then(|column| column[row]);
     let stone = |row: usize| TrueStone {
         axes_m: [a[row], b[row], c[row]],
@@ -102,6 +103,29 @@ fn check_order(path: &Path, table: &NumberTable) -> Result<(), ValidateError> {
         }),
     }
 }
+
+/// Directions that are no unit vectors at right angles would give angles that mean nothing.
+fn check_directions(path: &Path, directions: &[Option<[DVec3; 3]>]) -> Result<(), ValidateError> {
+    let is_rotation = |[a, b, c]: [DVec3; 3]| {
+        let off = [a.dot(a) - 1.0, b.dot(b) - 1.0, c.dot(c) - 1.0, a.dot(b), b.dot(c), c.dot(a)];
+        off.iter().all(|off| off.abs() < DIRECTIONS_OFF)
+    };
+    match directions.iter().position(|of_row| of_row.is_some_and(|axes| !is_rotation(axes))) {
+        None => Ok(()),
+        Some(row) => Err(ValidateError::Field {
+            path: path.to_owned(),
+            line: row as u64 + 2,
+            column: "r00",
+            text: format!("{:?}", directions[row].map(|axes| axes.map(|axis| axis.to_array())).unwrap_or_default()),
+            expected: DIRECTIONS_EXPECTED,
+        }),
+    }
+}
+
+/// How far lengths and right angles of directions may be off: tables are often printed with three digits.
+const DIRECTIONS_OFF: f64 = 0.02;
+const DIRECTIONS_EXPECTED: &str =
+    "row of three unit vectors at right angles, r00 to r02 the direction of A, r10 to r12 of B, r20 to r22 of C";
 
 const NUMBER_EXPECTED: &str =
     "number of this row: rows are numbered from 0 and sorted, since triangles name stones by them";
