@@ -123,3 +123,28 @@ pub fn facts(reach: &Reach, index: &Index, plan: &Plan, warnings: &[String], los
         "zero_area_triangles": index.scale.zero_area_triangles,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::DVec3;
+
+    #[test]
+    fn a_limit_that_the_mesh_raises_is_said_with_both_areas_and_one_that_it_does_not_is_not() {
+        let scale = Scale {
+            vertices: 3,
+            triangles: 1,
+            min: DVec3::ZERO,
+            max: DVec3::ONE,
+            surface_area_m2: 1e-4,
+            mean_triangle_area_m2: 1e-4,
+            mean_edge_m: 0.015,
+            spacing_m: 0.0,
+            zero_area_triangles: 0,
+        };
+        let asked = |min_grain_area_m2| SegmentSettings { min_grain_area_m2, ..SegmentSettings::default() };
+        let said = raised_limit(&scale, &asked(1e-3)).unwrap_or_default();
+        assert!(["5.00e-3 m²", "not 1e-3", "50 mean"].iter().all(|part| said.contains(part)), "{said}");
+        assert_eq!(raised_limit(&scale, &asked(6e-3)), None);
+    }
+}

@@ -5,7 +5,8 @@
 mod support;
 
 use gravelometer::geometry::DVec3;
-use gravelometer::open::MemorySurface;
+use gravelometer::open::{MemorySurface, Reach};
+use gravelometer::settings::InputSettings;
 use proptest::prelude::*;
 use std::process::Output;
 use support::bed::{Rng, bed, ply};
@@ -89,6 +90,25 @@ fn a_face_that_names_a_vertex_that_is_not_there_is_refused_by_its_number() {
     let mut mesh = small();
     mesh.triangles[1234][1] = 9_999_999;
     Run::of(&ply(&mesh)).names_the_file().fails_with("face 1234 refers to vertex 9999999");
+}
+
+#[test]
+fn a_survey_that_another_program_changes_meanwhile_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = folder.path().join("reach.ply");
+    let bytes = ply(&bed(1, 40, 40));
+    std::fs::write(&mesh, &bytes).unwrap();
+    let (reach, _) = Reach::open(std::slice::from_ref(&mesh), &InputSettings::default(), &|_, _| {}).unwrap();
+    reach.check_unchanged().unwrap();
+    let at = std::fs::metadata(&mesh).unwrap().modified().unwrap() + std::time::Duration::from_nanos(1000);
+    std::fs::File::options().append(true).open(&mesh).unwrap().set_modified(at).unwrap();
+    let refused = |what: &str| {
+        let said = reach.check_unchanged().unwrap_err().to_string();
+        assert!(said.contains("reach.ply") && said.contains(what) && said.contains("help:"), "{said}");
+    };
+    refused("was changed while it was read");
+    std::fs::remove_file(&mesh).unwrap();
+    refused("No such file");
 }
 
 #[test]

@@ -142,12 +142,18 @@ fn domes(rough: bool) -> MemorySurface {
             surface.positions.push(DVec3::new(x, y, top + if is_rough { rise } else { 0.0 }));
         }
     }
-    let at = |i: usize, j: usize| (j * (n + 1) + i) as u64;
-    for (i, j) in (0..n).flat_map(|j| (0..n).map(move |i| (i, j))) {
-        let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
-        surface.triangles.extend([[a, b, c], [a, c, d]]);
-    }
+    surface.triangles = grid(n);
     surface
+}
+
+/// Two triangles for each square of so many on each side, vertices row by row.
+fn grid(n: usize) -> Vec<[u64; 3]> {
+    let at = |i: usize, j: usize| (j * (n + 1) + i) as u64;
+    let of_square = |(i, j): (usize, usize)| {
+        let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+        [[a, b, c], [a, c, d]]
+    };
+    (0..n).flat_map(|j| (0..n).map(move |i| (i, j))).flat_map(of_square).collect()
 }
 
 #[test]
@@ -163,6 +169,32 @@ fn the_second_look_finds_a_rough_dome_between_two_smooth_ones_and_changes_nothin
     let [without, with] = [0, 12].map(|passes| found(&smooth, passes));
     assert_eq!(wide(&with), 3);
     assert_same(&without, &with, "smooth domes");
+}
+
+/// A level sheet that is furrowed from one side: the furrows are valleys, and what they leave bends downward everywhere.
+fn furrowed() -> MemorySurface {
+    let n = 140;
+    let mut surface = MemorySurface::default();
+    for j in 0..=n {
+        for i in 0..=n {
+            let across = (i % 14) as f64 - 7.0;
+            let along = ((j as f64 - 15.0) / 15.0).clamp(0.0, 1.0);
+            surface.positions.push(DVec3::new(i as f64, j as f64, -0.02 * along * across * across) / n as f64);
+        }
+    }
+    surface.triangles = grid(n);
+    surface
+}
+
+#[test]
+fn a_level_sheet_is_no_stone_though_what_its_furrows_leave_bends_downward_everywhere() {
+    let segment = SegmentSettings { min_grain_area_m2: 0.02, ..SegmentSettings::default() };
+    let how = ("sheet", segment, ValleySettings::default());
+    let wide = |surface: &MemorySurface| {
+        let found = catalogue(&indexed(surface, ONE_TILE), &how, ONE_TILE).0;
+        found.grains.iter().filter(|g| g.grain.surface_area_m2 > 0.2).count()
+    };
+    assert_eq!([wide(&furrowed()), wide(&domes(false))], [0, 3]);
 }
 
 /// Halos as thin as they come: most of a tile is unknown, and the little that it claims to know must be so. Every grain of

@@ -316,6 +316,8 @@ fn what_a_header_declares_is_not_believed() {
         (with(&las, &[(107, &[100, 0, 0, 0])]), &["declares 100 points", "holds 200"]),
         (with(&las, &[(131, &0f64.to_le_bytes())]), &["along x", "scale 0e0"]),
         (with(&las, &[(147, &f64::INFINITY.to_le_bytes())]), &["along z", "scale inf"]),
+        (with(&las, &[(139, &(-0.001f64).to_le_bytes())]), &["along y", "scale -1e-3", "above 0"]),
+        (with(&las, &[(155, &1e20f64.to_le_bytes())]), &["along x", "offset 1e20"]),
         (with(&las, &[(155, &f64::NAN.to_le_bytes())]), &["along x", "offset NaN"]),
         // 1.4: an extended record of any length, anywhere.
         (

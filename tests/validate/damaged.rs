@@ -52,6 +52,14 @@ fn a_table_without_what_is_needed_names_column_line_and_text() {
         ("id,A,B,C\n1,3,2,1\n2,3,2,1\n", vec!["line 2", "`id`", "`1`"]),
         ("A,B,C\n3,2,1\n3,2\n", vec!["cannot read the table"]),
         ("A,B,C\n3,2,1\n", vec!["tri_id", "stone 1", "1 stones"]),
+        (
+            "A,B,C,r00,r01,r02,r10,r11,r12,r20,r21,r22\n3,2,1,1,0,0,0,1,0,0,0,1\n3,2,1,1,0,0,0.5,0.866,0,0,0,1\n",
+            vec!["line 3", "`r00`", "0.866", "right angles"],
+        ),
+        (
+            "A,B,C,r00,r01,r02,r10,r11,r12,r20,r21,r22\n3,2,1,0,0,0,0,0,0,0,0,0\n3,2,1,,,,,,,,,\n",
+            vec!["line 2", "unit vectors"],
+        ),
         ("", vec!["`A`"]),
     ] {
         std::fs::write(truth.join("truth.csv"), table).unwrap();
