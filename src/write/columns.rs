@@ -163,7 +163,7 @@ pub const COLUMNS: &[Column] = columns! {
     "bulge" Real "mean curvature times the square root of the area: 2.5 for half a ball, 0 for a plane, below 0 for a hollow; not used by confidence" |r| Value::maybe(r.grain.evidence.map(|e| e.bulge));
     "core_share" Real "share of its area that lies away from valleys, 0 to 1; raises confidence" |r| Value::maybe(r.grain.evidence.map(|e| e.core_share));
     "triangles" Integer "number of triangles; more of them raise confidence" |r| whole(r.grain.triangles);
-    "touches_edge" Boolean "an edge of the mesh (survey border, scan shadow) bounds the grain: sizes are lower bounds" |r| Value::Boolean(r.grain.touches_edge);
+    "touches_edge" Boolean "an edge of the mesh (survey border, hole, scan shadow) bounds the grain: what lies beyond is in none of its sizes" |r| Value::Boolean(r.grain.touches_edge);
     "few_triangles" Boolean "fewer triangles than measure.few_triangles: sizes are coarse" |r| Value::Boolean(r.grain.triangles < r.settings.measure.few_triangles);
     "near_equant_ab" Boolean "a/b below measure.equant_ratio: yaw, pitch, roll, trend and plunge are given but undefined" |r| Value::Boolean(near_equant(r.grain.axes_m, &r.settings.measure).0);
     "near_equant_bc" Boolean "b/c below measure.equant_ratio: roll, dip and dip direction are given but undefined" |r| Value::Boolean(near_equant(r.grain.axes_m, &r.settings.measure).1);
