@@ -303,7 +303,7 @@ fn what_a_header_declares_is_not_believed() {
     let points_at = u32::from_le_bytes([laz[96], laz[97], laz[98], laz[99]]) as usize;
     let table_at = u64::from_le_bytes(laz[points_at..points_at + 8].try_into().expect("eight")) as usize;
     let most = u64::MAX.to_le_bytes();
-    let cases: [(String, &[&str]); 16] = [
+    let cases: [(String, &[&str]); 18] = [
         (with(&las, &[(0, b"LASX")]), &["not a LAS file", "`LASX`"]),
         (with(&las, &[(25, &[6])]), &["version 1.6", "1.0 to 1.5"]),
         (with(&las, &[(24, &[2])]), &["version 2.2"]),

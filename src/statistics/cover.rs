@@ -16,13 +16,18 @@ use std::ops::Range;
 /// Parts of a cell's side in which overlapping outlines are put together.
 const PARTS: f64 = 16_777_216.0;
 
-/// A ring of a grain's outline, and a cell that it may reach into.
-struct Part<'c> {
-    /// Number of the cell in the raster, and its column and row from the south-west.
-    cell: usize,
-    at: [usize; 2],
+/// A ring of a grain's outline, and a row of cells that it may reach into.
+struct Crossing<'c> {
+    row: usize,
     grain: usize,
     ring: &'c [[i64; 2]],
+}
+
+/// What of a ring lies in a cell, in cells from the cell's south-western corner.
+struct Part {
+    column: usize,
+    grain: usize,
+    ring: Vec<[f64; 2]>,
 }
 
 /// Share of each cell that outlines cover, 0 to 1, row-major from the north-west.
@@ -30,42 +35,57 @@ pub(super) fn cover(catalogue: &Catalogue, frame: &Frame, grid: &RasterGrid) -> 
     let cells_per_step = frame.outline_step_m() / grid.cell_m;
     let shift = grid.corner_shift();
     let place = |p: &[i64; 2]| -> [f64; 2] { std::array::from_fn(|i| p[i] as f64 * cells_per_step + shift[i]) };
-    let mut parts = Vec::new();
+    let mut crossings = Vec::new();
     for (grain, of_grain) in catalogue.grains.iter().enumerate() {
         for ring in of_grain.grain.outline.iter().flatten() {
-            let columns = span(ring.iter().map(|p| place(p)[0]), grid.columns);
             let rows = span(ring.iter().map(|p| place(p)[1]), grid.rows);
-            for [column, row] in columns.flat_map(|column| rows.clone().map(move |row| [column, row])) {
-                parts.push(Part { cell: grid.index(column, row), at: [column, row], grain, ring });
-            }
+            crossings.extend(rows.map(|row| Crossing { row, grain, ring }));
         }
     }
-    parts.sort_by_key(|part| part.cell);
-    let of_cells: Vec<&[Part]> = parts.chunk_by(|a, b| a.cell == b.cell).collect();
-    let shares: Vec<f64> = of_cells.par_iter().map(|parts| share(parts, &place)).collect();
+    crossings.sort_by_key(|crossing| crossing.row);
+    // Row by row, so that only what is worked on is held twice.
+    let of_rows: Vec<&[Crossing]> = crossings.chunk_by(|a, b| a.row == b.row).collect();
+    let shares: Vec<Vec<(usize, f64)>> =
+        of_rows.par_iter().map(|crossings| shares_of_row(crossings, grid.columns, &place)).collect();
     let mut cover = vec![0.0; grid.cells()];
-    of_cells.iter().zip(shares).for_each(|(parts, share)| cover[parts[0].cell] = share);
+    for (crossings, shares) in of_rows.iter().zip(shares) {
+        shares.iter().for_each(|&(column, share)| cover[grid.index(column, crossings[0].row)] = share);
+    }
     cover
 }
 
-/// Share of a cell that the rings which may reach into it cover.
-fn share(parts: &[Part], place: &impl Fn(&[i64; 2]) -> [f64; 2]) -> f64 {
-    let [column, row] = parts[0].at.map(|at| at as f64);
-    let in_cell = |part: &Part| {
-        let mut ring: Vec<[f64; 2]> = part.ring.iter().map(place).collect();
-        for (axis, at, sign) in [(0, column, 1.0), (0, column + 1.0, -1.0), (1, row, 1.0), (1, row + 1.0, -1.0)] {
-            ring = clip(&ring, axis, at, sign);
+/// The columns of a row in which anything lies, with the share that is covered.
+fn shares_of_row(
+    crossings: &[Crossing],
+    columns: usize,
+    place: &(impl Fn(&[i64; 2]) -> [f64; 2] + Sync),
+) -> Vec<(usize, f64)> {
+    let mut parts = Vec::new();
+    for &Crossing { row, grain, ring } in crossings {
+        let south = row as f64;
+        let ring: Vec<[f64; 2]> = ring.iter().map(place).collect();
+        let strip = clip(&clip(&ring, 1, south, 1.0), 1, south + 1.0, -1.0);
+        for column in span(strip.iter().map(|p| p[0]), columns) {
+            let west = column as f64;
+            let mut ring = clip(&clip(&strip, 0, west, 1.0), 0, west + 1.0, -1.0);
+            ring.iter_mut().for_each(|p| *p = [p[0] - west, p[1] - south]);
+            parts.push(Part { column, grain, ring });
         }
-        ring
-    };
+    }
+    parts.sort_by_key(|part| part.column);
+    parts.chunk_by(|a, b| a.column == b.column).map(|parts| (parts[0].column, share(parts))).collect()
+}
+
+/// Share of a cell that parts of rings cover.
+fn share(parts: &[Part]) -> f64 {
     // Rings of one grain do not overlap; holes run clockwise and take away.
     if parts.iter().all(|part| part.grain == parts[0].grain) {
-        return parts.iter().map(|part| signed_area(&in_cell(part))).sum::<f64>().clamp(0.0, 1.0);
+        return parts.iter().map(|part| signed_area(&part.ring)).sum::<f64>().clamp(0.0, 1.0);
     }
     let mut overlay: Overlay<i32> = Overlay::new_custom(256, IntOverlayOptions::ogc(), Solver::default());
     for part in parts {
-        let whole = |[x, y]: [f64; 2]| [x - column, y - row].map(|share| (share * PARTS).round() as i32);
-        let ring: Vec<IntPoint<i32>> = in_cell(part).into_iter().map(whole).map(|[x, y]| IntPoint::new(x, y)).collect();
+        let whole = |p: &[f64; 2]| p.map(|share| (share * PARTS).round() as i32);
+        let ring: Vec<IntPoint<i32>> = part.ring.iter().map(whole).map(|[x, y]| IntPoint::new(x, y)).collect();
         overlay.add_contour(&ring, ShapeType::Subject);
     }
     // Around what lies in a hole of one grain and outside all others the rings wind 0 times.
@@ -120,11 +140,13 @@ fn signed_area(ring: &[[f64; 2]]) -> f64 {
 mod tests {
     use super::*;
 
-    /// Rings in cells, of one cell at the origin.
+    /// Share of the first cell of a row of one; places are in hundredths of it.
     fn share_of(rings: &[(usize, Vec<[i64; 2]>)]) -> f64 {
-        let part = |(grain, ring)| Part { cell: 0, at: [0, 0], grain, ring };
-        let parts: Vec<Part> = rings.iter().map(|(grain, ring)| part((*grain, ring.as_slice()))).collect();
-        share(&parts, &|p| p.map(|x| x as f64 / 100.0))
+        let crossing = |(grain, ring)| Crossing { row: 0, grain, ring };
+        let crossings: Vec<Crossing> = rings.iter().map(|(grain, ring)| crossing((*grain, ring.as_slice()))).collect();
+        let shares = shares_of_row(&crossings, 1, &|p| p.map(|x| x as f64 / 100.0));
+        assert_eq!((shares.len(), shares[0].0), (1, 0));
+        shares[0].1
     }
 
     fn square(west: i64, south: i64, side: i64) -> Vec<[i64; 2]> {
