@@ -67,7 +67,7 @@ pub enum OpenError {
     /// The first line is not `ply`.
     #[error(
         "{path}: is not a PLY file: it starts with `{start}`, not with a line `ply`\nhelp: meshes are \
-         read from PLY, clouds from PLY, LAS and LAZ; export the mesh as binary PLY, for instance from CloudCompare or MeshLab"
+         read from PLY, clouds from PLY, LAS and LAZ (which start with `LASF`); export the mesh as binary PLY, for instance from CloudCompare or MeshLab"
     )]
     NotPly { path: String, start: String },
     /// The header does not end.
@@ -157,8 +157,9 @@ pub enum OpenError {
     ListLength { path: String, element: String, index: u64, property: String, length: i64, byte: u64 },
     /// A face that is no polygon.
     #[error(
-        "{path}: face {face} has {corners} corners (byte {byte}); a face needs at least 3\nhelp: clean the mesh, for \
-         instance in MeshLab with Filters > Cleaning and Repairing, or export it again"
+        "{path}: face {face} has {corners} corners (byte {byte}); a face needs at least 3\nhelp: if the header \
+         counts vertices or faces wrong, export the mesh again; else clean it, for instance in MeshLab with Filters > Cleaning \
+         and Repairing"
     )]
     FewCorners { path: String, face: u64, corners: u64, byte: u64 },
     /// A face that is no polygon either.

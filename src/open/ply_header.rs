@@ -203,7 +203,10 @@ impl HeaderLines {
                 // Some editors put a byte order mark before text.
                 text = text.trim_start_matches('\u{feff}').to_owned();
                 if text != "ply" {
-                    return Err(OpenError::NotPly { path: path.to_owned(), start: shorten(&text) });
+                    return Err(OpenError::NotPly {
+                        path: path.to_owned(),
+                        start: shorten(&text.escape_debug().to_string()),
+                    });
                 }
                 old_mac = head.get(end) == Some(&b'\r') && !crlf;
             }

@@ -39,7 +39,8 @@ pub enum TileError {
     Store(#[from] StoreError),
     /// It would have to see more at once than memory holds.
     #[error(
-        "to see what is cut off {halo_m:.3} m beyond its core it {over}\nhelp: raise --memory, or lower --max-grain: wider bodies are then told apart from grains without seeing them whole"
+        "to see what is cut off {halo_m:.3} m beyond its core it {over}\nhelp: raise --memory by {more_mib} MiB or more, or lower --max-grain: wider bodies are then told apart from grains without seeing them whole",
+        more_mib = (over.needed.saturating_sub(over.total) >> 20) + 1
     )]
     TooWide {
         /// How far it looked, metres.

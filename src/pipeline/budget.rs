@@ -82,7 +82,7 @@ impl Reservation {
 
 /// One job alone needs more than the whole budget.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("needs {} MiB, but the memory budget is {} MiB", needed >> 20, total >> 20)]
+#[error("needs {} MiB, but the memory for tiles is {} MiB", needed >> 20, total >> 20)]
 pub struct OverBudget {
     /// What it needs, bytes.
     pub needed: u64,
