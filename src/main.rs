@@ -118,7 +118,7 @@ fn inspect_command(args: &InspectArgs) -> Result<ExitCode, Error> {
 
 fn settings_command(args: &SettingArgs) -> Result<ExitCode, Error> {
     let settings = args.settings()?;
-    print(&settings.printed());
+    print(&settings.printed().expect("plain numbers and texts"));
     Ok(ExitCode::Done)
 }
 

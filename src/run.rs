@@ -254,8 +254,7 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
         mesh: labelled.then_some(&mesh),
         cloud: settings.output.labelled_cloud.then_some(&reach),
     };
-    reach.check_unchanged()?;
-    let files = crew.pool.install(|| write(&folder, &results, progress, control))?;
+    let files = crew.pool.install(|| write(&folder, &results, progress, control, &reach))?;
     if lost.is_empty() {
         drop((index, divergence, findings));
         work.finish();
@@ -360,12 +359,16 @@ fn write(
     results: &Results,
     progress: &dyn Progress,
     control: &Control,
+    reach: &Reach,
 ) -> Result<Vec<PathBuf>, Error> {
     let files = results.names().len();
     progress.begin("write", files as u64, Unit::Files);
     let written = write_unnamed(folder, results, &|_| progress.advance(1));
     progress.end();
     let written = written?;
+    // Extra attributes of a labelled cloud come from its file, which is opened again for them.
+    let opened_again = results.cloud.is_some_and(|reach| matches!(reach.files(), [only] if only.is_las()));
+    reach.check_unchanged(opened_again)?;
     control.commit()?;
     Ok(folder.publish(written)?)
 }

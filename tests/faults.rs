@@ -99,16 +99,24 @@ fn a_survey_that_another_program_changes_meanwhile_is_refused() {
     let bytes = ply(&bed(1, 40, 40));
     std::fs::write(&mesh, &bytes).unwrap();
     let (reach, _) = Reach::open(std::slice::from_ref(&mesh), &InputSettings::default(), &|_, _| {}).unwrap();
-    reach.check_unchanged().unwrap();
+    reach.check_unchanged(true).unwrap();
     let at = std::fs::metadata(&mesh).unwrap().modified().unwrap() + std::time::Duration::from_nanos(1000);
     std::fs::File::options().append(true).open(&mesh).unwrap().set_modified(at).unwrap();
-    let refused = |what: &str| {
-        let said = reach.check_unchanged().unwrap_err().to_string();
-        assert!(said.contains("reach.ply") && said.contains(what) && said.contains("help:"), "{said}");
+    let refused = |opened_again: bool| {
+        let said = reach.check_unchanged(opened_again).unwrap_err().to_string();
+        assert!(said.contains("reach.ply: was changed while it was read") && said.contains("help:"), "{said}");
     };
-    refused("was changed while it was read");
+    refused(false);
+    refused(true);
+    // What is mapped is still the old file where a new one takes its name, or none does.
+    let other = folder.path().join("new.ply");
+    std::fs::write(&other, &bytes).unwrap();
+    std::fs::rename(&other, &mesh).unwrap();
+    reach.check_unchanged(false).unwrap();
+    refused(true);
     std::fs::remove_file(&mesh).unwrap();
-    refused("No such file");
+    reach.check_unchanged(false).unwrap();
+    refused(true);
 }
 
 #[test]

@@ -140,7 +140,7 @@ fn a_changed_setting_or_input_is_refused_by_name_and_nothing_is_touched() {
     std::fs::write(&touched, &bytes).unwrap();
     let time = std::time::SystemTime::UNIX_EPOCH + Duration::from_secs(1_000_000_007);
     std::fs::File::options().append(true).open(&touched).unwrap().set_modified(time).unwrap();
-    refused(&touched, &[], &["input 1 was {", "\"modified_ns\":1000000007"]);
+    refused(&touched, &[], &["input 1 was {", "\"modified_s\":1000000007"]);
 
     // Without --resume the changed run begins anew and gives what it gives elsewhere.
     let (elsewhere, here) = (scene.path("elsewhere"), &out);

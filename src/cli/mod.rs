@@ -41,7 +41,8 @@ What is written to OUT:
   labelled_cloud.laz with --labelled-cloud: the input points with a grain_id for each, -1 in no grain (also for points
                      at the very place of another one); of one LAS file in its own coordinates, else on the map
 
-The grains do not depend on --tile-size, --threads and --memory, byte for byte; layer tiles of grains.gpkg and run.json say\nhow the work was cut.";
+The grains do not depend on --tile-size, --threads and --memory, byte for byte; how the work was cut is in layer tiles
+of grains.gpkg and in run.json.";
 
 /// Every pebble of a gravel river bed, from a 3D survey.
 #[derive(Debug, Parser)]
@@ -148,7 +149,7 @@ pub struct SettingArgs {
     /// Compute threads; 0: all cores [work.threads; default: 0]
     #[arg(long, value_name = "N", help_heading = "Work")]
     pub threads: Option<usize>,
-    /// Most memory to use, such as 2GiB; 0: half of what is there [work.memory; default: 0]
+    /// Most memory to use, such as 2GiB; empty or 0: half of what is there [work.memory; default: empty]
     #[arg(long, value_name = "SIZE", help_heading = "Work")]
     pub memory: Option<String>,
     /// Also write the input mesh, or the surface of a cloud, with a grain_id for each face [output.labelled_mesh; default:

@@ -136,7 +136,7 @@ pub fn inspect(paths: &[PathBuf], input: &InputSettings) -> Result<Inspection, O
     let files = reach.files().iter().zip(&sums).map(of_file).collect();
     let all = sums.iter().fold(Sums::default(), |a, &b| a.merge(b));
     let surface = figures(&all, reach.vertices(), reach.triangles());
-    if surface.surface_area_m2 <= 0.0 {
+    if !reach.is_cloud() && surface.surface_area_m2 <= 0.0 {
         warnings.push(refused(&"the surface has no area at all: check the unit (--unit) and the export"));
     }
     let counts = [reach.vertices(), reach.faces(), reach.triangles()];

@@ -71,8 +71,8 @@ pub struct Suggestion {
     pub smallest_grain_diameter_m: f64,
     /// The settings file that suits.
     pub preset: Preset,
-    /// For `--min-grain-area`, m²: that of the preset, or a disc of ten edges where the mesh is finer than the preset is meant for;
-    /// never less than the above, rounded up to two digits.
+    /// For `--min-grain-area`, m²: that of the preset, or a disc of ten edges (but at least 1e-4) where the mesh is finer than the preset
+    /// is meant for; never less than the above, rounded up to two digits.
     pub min_grain_area_m2: f64,
     /// For `--max-grain`, metres.
     pub max_grain_m: f64,
@@ -169,7 +169,7 @@ mod tests {
             Suggestion::new(&surface, true).min_grain_area_m2
         };
         assert_eq!(suggested(0.0007), limits[0].min_grain_area_m2);
-        // Between the meshes that two presets are meant for there is no jump.
+        // A mesh just too coarse for a preset is not asked for grains ten times as large.
         assert_eq!([0.00105, 0.002, 0.004, 0.006].map(suggested), [1e-4, 3.2e-4, limits[1].min_grain_area_m2, 2.9e-3]);
         assert_eq!(suggested(0.012), limits[2].min_grain_area_m2);
         assert_eq!(suggested(0.04), 0.032);

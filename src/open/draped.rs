@@ -2,6 +2,7 @@
 
 use super::error::OpenError;
 use super::mapped::MappedFile;
+use super::stamp::Stamp;
 use super::{Reach, Surface};
 use crate::geometry::DVec3;
 use std::fs::File;
@@ -21,7 +22,9 @@ impl<'a> DrapedCloud<'a> {
     /// # Errors
     /// The system refuses to map the file.
     pub fn new(reach: &'a Reach, triangles: &File, wide: bool) -> Result<DrapedCloud<'a>, OpenError> {
-        let triangles = MappedFile::of_scratch(triangles, 0).map_err(|source| OpenError::Surface { source })?;
+        let unreadable = |source| OpenError::Surface { source };
+        let stamp = Stamp::of(&triangles.metadata().map_err(unreadable)?);
+        let triangles = MappedFile::of_scratch(triangles, stamp).map_err(unreadable)?;
         Ok(DrapedCloud { reach, triangles, wide })
     }
 

@@ -64,6 +64,7 @@ pub enum OpenError {
          let what writes it end, then run again"
     )]
     Changed { path: String },
+
     /// The first line is not `ply`.
     #[error(
         "{path}: is not a PLY file: it starts with `{start}`, not with a line `ply`\nhelp: meshes are \
@@ -236,7 +237,7 @@ pub enum OpenError {
     /// A scale or an offset that makes no coordinates.
     #[error(
         "{path}: coordinates along {axis} have scale {scale:e} and offset {offset:e}, which makes no places of \
-         them: a scale is above 0, and an offset not so large that steps of the scale are lost in it\nhelp: the header is \
+         them: a scale is not 0, and an offset not so large that the scale is lost in it\nhelp: the header is \
          damaged; export the cloud again"
     )]
     LasTransform { path: String, axis: char, scale: f64, offset: f64 },

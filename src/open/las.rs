@@ -66,7 +66,7 @@ pub(super) fn decode(path: &str, source: &MappedFile, progress: &Progress<'_>) -
     if file.format.has_color && colors == Colors::None {
         warnings.push(Warning::ColorsAllZero { path: path.to_owned() });
     }
-    let bytes = MappedFile::of_scratch(&scratch, source.modified_ns()).map_err(|e| unwritten(&file, e))?;
+    let bytes = MappedFile::of_scratch(&scratch, source.stamp()).map_err(|e| unwritten(&file, e))?;
     let header = PlyHeader {
         encoding: Encoding::BinaryLittleEndian,
         elements: vec![element(file.points, colors)],

@@ -294,13 +294,17 @@ fn check_transforms(source: Source<'_>, header: &raw::Header) -> Result<(), Open
     ];
     for (axis, scale, offset) in axes {
         let far = |raw: i32| (f64::from(raw) * scale + offset).is_finite();
-        let lost = offset + scale == offset;
-        if !scale.is_normal() || scale < 0.0 || lost || !far(i32::MIN) || !far(i32::MAX) {
+        // Steps may be finer than doubles are there, as writers choose that scale to the full range of their counts.
+        let lost = offset + scale * FINE_STEPS == offset;
+        if !scale.is_normal() || lost || !far(i32::MIN) || !far(i32::MAX) {
             return Err(OpenError::LasTransform { path: source.path.to_owned(), axis, scale, offset });
         }
     }
     Ok(())
 }
+
+/// So many steps of the scale must make a difference.
+const FINE_STEPS: f64 = 65_536.0;
 
 /// Records of variable length, one behind the other.
 fn read_records(

@@ -3,49 +3,33 @@
 //! # Contract
 //! A mapped file must not be truncated or rewritten in place while it is open. The system answers a read
 //! beyond the new end with `SIGBUS`, which ends the program; a rewrite changes bytes that were already
-//! validated, so that an index may then be out of range (a panic, never a read outside the map). Writers
+//! validated, so that an index may then be out of range (a panic, never a read outside the map), and is
+//! refused before results are published. Writers
 //! that replace a file by renaming a new one over it are safe: the map keeps the old one.
 #![allow(unsafe_code)]
 
 use super::error::OpenError;
+use super::stamp::Stamp;
 use memmap2::{Mmap, UncheckedAdvice};
-use std::fs::{self, File, Metadata};
+use std::fs::{self, File};
 use std::io::ErrorKind;
 use std::ops::Deref;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::UNIX_EPOCH;
 
 /// The bytes of one input file.
 #[derive(Debug)]
 pub(super) struct MappedFile {
     map: Mmap,
-    modified_ns: i64,
+    stamp: Stamp,
+    /// Whether it is a scratch file, written from the file of that stamp.
+    is_scratch: bool,
     /// Bytes passed since the pages were last let go.
     passed: AtomicU64,
 }
 
 /// Pages are let go after so many bytes: few enough not to count, enough to be cheap.
 const KEPT_BYTES: u64 = 32 << 20;
-
-/// Time of the last change, nanoseconds since 1970; 0 where the system does not tell.
-fn modified_ns(facts: &Metadata) -> i64 {
-    let since = facts.modified().ok().and_then(|t| t.duration_since(UNIX_EPOCH).ok());
-    since.map_or(0, |t| i64::try_from(t.as_nanos()).unwrap_or(i64::MAX))
-}
-
-/// Refuses a file that is not what it was when it had this length and this time of its last change.
-///
-/// # Errors
-/// It was changed, or is no longer there.
-pub(super) fn check_unchanged(path: &Path, bytes: u64, modified: i64) -> Result<(), OpenError> {
-    let unreadable = |source| OpenError::Unreadable { path: path.display().to_string(), source };
-    let facts = fs::metadata(path).map_err(unreadable)?;
-    if facts.len() != bytes || modified_ns(&facts) != modified {
-        return Err(OpenError::Changed { path: path.display().to_string() });
-    }
-    Ok(())
-}
 
 impl MappedFile {
     /// Maps a file for reading.
@@ -75,18 +59,17 @@ impl MappedFile {
         // That nobody truncates or rewrites the file meanwhile is the contract above, which no program can
         // enforce on Linux; every index into the slice is bounds-checked, so a breach cannot read outside it.
         let map = unsafe { Mmap::map(&file) }.map_err(unreadable)?;
-        let modified_ns = modified_ns(&facts);
-        Ok(MappedFile { map, modified_ns, passed: AtomicU64::new(0) })
+        Ok(MappedFile { map, stamp: Stamp::of(&facts), is_scratch: false, passed: AtomicU64::new(0) })
     }
 
-    /// Maps a scratch file without a name, which stands for a file that was changed at this time.
+    /// Maps a scratch file without a name, which stands for the file of this stamp.
     ///
     /// # Errors
     /// The system refuses.
-    pub(super) fn of_scratch(file: &File, modified_ns: i64) -> std::io::Result<MappedFile> {
+    pub(super) fn of_scratch(file: &File, stamp: Stamp) -> std::io::Result<MappedFile> {
         // SAFETY: as in `open`; a file without a name is nobody else's.
         let map = unsafe { Mmap::map(file) }?;
-        Ok(MappedFile { map, modified_ns, passed: AtomicU64::new(0) })
+        Ok(MappedFile { map, stamp, is_scratch: true, passed: AtomicU64::new(0) })
     }
 
     /// Says that so many bytes were read and are not needed soon.
@@ -112,9 +95,17 @@ impl MappedFile {
         }
     }
 
-    /// Time of the last change, seconds since 1970; 0 where the file system does not tell.
-    pub(super) fn modified_ns(&self) -> i64 {
-        self.modified_ns
+    /// The file on the disk, as it was when it was opened.
+    pub(super) fn stamp(&self) -> Stamp {
+        self.stamp
+    }
+
+    /// Refuses a file that was written to while it was mapped.
+    ///
+    /// # Errors
+    /// What was read may be partly of the file before and partly of that after.
+    pub(super) fn check_not_rewritten(&self, path: &Path) -> Result<(), OpenError> {
+        if self.is_scratch { Ok(()) } else { self.stamp.check_not_rewritten(path) }
     }
 }
 

@@ -33,6 +33,7 @@ mod reach;
 mod records;
 mod sample;
 mod scalar;
+mod stamp;
 mod surface;
 mod survey_file;
 mod transcode;

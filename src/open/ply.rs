@@ -22,7 +22,7 @@ use ply_rs_bw::ply::Encoding;
 #[derive(Debug)]
 pub(super) struct PlyMesh {
     /// The records: of the file itself, or of what it was transcoded to.
-    bytes: MappedFile,
+    pub(super) bytes: MappedFile,
     /// Of the file itself.
     pub(super) fingerprint: Fingerprint,
     /// Of the file itself.
@@ -80,7 +80,7 @@ impl PlyMesh {
 
     /// Decodes the points of a LAS, LAZ or COPC file.
     fn of_las(path: &str, bytes: &MappedFile, progress: &Progress<'_>) -> Result<PlyMesh, OpenError> {
-        let fingerprint = Fingerprint::of(bytes, bytes.modified_ns());
+        let fingerprint = Fingerprint::of(bytes, bytes.stamp().modified_s());
         let points = decode(path, bytes, progress)?;
         let LasPoints { format, crs, scale, noise, withheld, warnings, bounds, trailing_bytes, .. } = points;
         let las = Some(LasFacts { format, crs, scale, noise, withheld, warnings });
@@ -96,7 +96,7 @@ impl PlyMesh {
         header: PlyHeader,
         progress: &Progress<'_>,
     ) -> Result<PlyMesh, OpenError> {
-        let fingerprint = Fingerprint::of(&bytes, bytes.modified_ns());
+        let fingerprint = Fingerprint::of(&bytes, bytes.stamp().modified_s());
         if !is_needed(&header) {
             return PlyMesh::records(path, (bytes, fingerprint), header, progress);
         }

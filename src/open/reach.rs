@@ -5,7 +5,7 @@ use super::error::OpenError;
 use super::frame::Frame;
 use super::georeference::{Georeference, SideFiles};
 use super::las_crs::CloudCrs;
-use super::mapped::{MappedFile, check_unchanged};
+use super::mapped::MappedFile;
 use super::ply::PlyMesh;
 use super::precision::{check_not_degrees, check_precision};
 use super::progress::Progress;
@@ -94,14 +94,15 @@ impl Reach {
         self.triangles() == 0
     }
 
-    /// Refuses what another program has changed since it was opened.
+    /// Refuses what another program has written to since it was opened; with `opened_again` also what it has replaced or
+    /// removed, which matters where files were opened a second time.
     ///
     /// # Errors
-    /// A file has another length or another time of its last change, or is no longer there.
-    pub fn check_unchanged(&self) -> Result<(), OpenError> {
-        let of_file = |file: &SurveyFile| {
-            let was = file.fingerprint();
-            check_unchanged(file.path(), was.bytes, was.modified_ns)
+    /// [`OpenError::Changed`], with the first such file.
+    pub fn check_unchanged(&self, opened_again: bool) -> Result<(), OpenError> {
+        let of_file = |file: &SurveyFile| match opened_again {
+            true => file.mesh.bytes.stamp().check_same(file.path()),
+            false => file.mesh.bytes.check_not_rewritten(file.path()),
         };
         self.files().iter().try_for_each(of_file)
     }

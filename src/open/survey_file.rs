@@ -12,20 +12,28 @@ use std::path::{Path, PathBuf};
 pub struct Fingerprint {
     /// Length, bytes.
     pub bytes: u64,
-    /// Time of the last change, nanoseconds since 1970.
-    pub modified_ns: i64,
-    /// FNV-1a (64 bit) of the first and the last 64 KiB.
-    pub ends_fnv1a64: u64,
+    /// Time of the last change, seconds since 1970.
+    pub modified_s: i64,
+    /// FNV-1a (64 bit) of the first and the last 64 KiB, and of 4 KiB at each of 128 places between.
+    pub samples_fnv1a64: u64,
 }
 
 /// Length of each end that goes into a fingerprint, bytes.
 const END_BYTES: usize = 64 << 10;
+/// Places between the ends, and what is taken at each, bytes: an export made anew within a second has other coordinates there.
+const SAMPLES: usize = 128;
+const SAMPLE_BYTES: usize = 4 << 10;
 
 impl Fingerprint {
-    pub(super) fn of(bytes: &[u8], modified_ns: i64) -> Fingerprint {
+    pub(super) fn of(bytes: &[u8], modified_s: i64) -> Fingerprint {
         let end = bytes.len().min(END_BYTES);
-        let hash = fnv1a64(fnv1a64(FNV_BASIS, &bytes[..end]), &bytes[bytes.len() - end..]);
-        Fingerprint { bytes: bytes.len() as u64, modified_ns, ends_fnv1a64: hash }
+        let (first, last) = (&bytes[..end], &bytes[bytes.len() - end..]);
+        let sample = |i: usize| {
+            let at = (bytes.len() as u128 * (1 + i as u128) / (1 + SAMPLES as u128)) as usize;
+            &bytes[at..bytes.len().min(at + SAMPLE_BYTES)]
+        };
+        let hash = [first, last].into_iter().chain((0..SAMPLES).map(sample)).fold(FNV_BASIS, fnv1a64);
+        Fingerprint { bytes: bytes.len() as u64, modified_s, samples_fnv1a64: hash }
     }
 }
 

@@ -62,7 +62,7 @@ pub(super) fn transcode(
         Encoding::BinaryBigEndian => job.work(BigEndian::new(payload))?,
         Encoding::BinaryLittleEndian => job.work(LittleEndian::new(payload))?,
     };
-    let bytes = MappedFile::of_scratch(&scratch, source.bytes.modified_ns()).map_err(|error| OpenError::Scratch {
+    let bytes = MappedFile::of_scratch(&scratch, source.bytes.stamp()).map_err(|error| OpenError::Scratch {
         path: source.path.to_owned(),
         folder: folder(),
         source: error,

@@ -1,7 +1,6 @@
 //! Settings as a file to edit: every key with its unit, its range and what it does, as `configs/default.toml` has them.
 
 use super::{PRESETS, Settings};
-use std::fmt::Write;
 
 const HEAD: &str = "\
 # Settings of gravelometer, for --config. Keys may be left out: the default holds then.
@@ -11,9 +10,12 @@ const COMMENT_COLUMN: usize = 27;
 
 impl Settings {
     /// A settings file with these values, which [`Settings::load`] reads back as they are.
-    pub fn printed(&self) -> String {
+    ///
+    /// # Errors
+    /// None that are known: all settings are numbers, texts and lists of them.
+    pub fn printed(&self) -> Result<String, toml::ser::Error> {
         let [(_, lines), ..] = PRESETS;
-        let values = toml::Table::try_from(self).unwrap_or_default();
+        let values = toml::Table::try_from(self)?;
         let mut section = "";
         let mut text = HEAD.to_owned();
         for line in lines.lines().skip_while(|line| line.starts_with('#')) {
@@ -26,19 +28,15 @@ impl Settings {
             match values.get(section).and_then(|section| section.get(key)) {
                 Some(value) => {
                     let pair = format!("{key} = {value}");
-                    let _ = writeln!(
-                        text,
-                        "{pair:<width$}{}",
-                        comment.unwrap_or_default(),
-                        width = COMMENT_COLUMN.max(pair.len() + 1)
-                    );
+                    let comment = comment.unwrap_or_default();
+                    let gap = COMMENT_COLUMN.saturating_sub(pair.len()).max(1);
+                    let gap = if comment.is_empty() { 0 } else { gap };
+                    text += &format!("{pair}{:gap$}{comment}\n", "");
                 }
-                None => {
-                    let _ = writeln!(text, "{line}");
-                }
+                None => text += &format!("{line}\n"),
             }
         }
-        text.lines().map(|line| line.trim_end().to_owned() + "\n").collect()
+        Ok(text)
     }
 }
 
@@ -49,8 +47,9 @@ mod tests {
     #[test]
     fn every_preset_is_printed_with_all_keys_and_comments_and_reads_back() {
         for (name, _) in PRESETS {
-            let settings = Settings::load(Some(name.as_ref()), &["input.crs=a # \"b\" \\\\".into()]).expect("a preset");
-            let text = settings.printed();
+            let settings =
+                Settings::load(Some(name.as_ref()), &["input.crs='''a # \"b\"  \n\t\\ c'''".into()]).expect("a preset");
+            let text = settings.printed().expect("TOML");
             let read: Settings = toml::from_str(&text).expect("TOML");
             assert_eq!(read, settings, "{name}:\n{text}");
             let keys = |text: &str| {

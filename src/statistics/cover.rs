@@ -14,7 +14,11 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Parts of a cell's side in which overlapping outlines are put together.
-const PARTS: f64 = 16_777_216.0;
+const PARTS: f64 = (1u32 << 29) as f64;
+/// Rings that are put together at once: of more, memory and time grow faster than their number.
+const AT_ONCE: usize = 64;
+/// Times that a cell is halved in both directions to that end.
+const HALVINGS: u32 = 8;
 
 /// A ring of a grain's outline, and a row of cells that it may reach into.
 struct Crossing<'c> {
@@ -30,8 +34,8 @@ struct Part {
     ring: Vec<[f64; 2]>,
 }
 
-/// Share of each cell that outlines cover, 0 to 1, row-major from the north-west.
-pub(super) fn cover(catalogue: &Catalogue, frame: &Frame, grid: &RasterGrid) -> Vec<f64> {
+/// Share of each cell that outlines cover, 0 to 1, row-major from the north-west; and the sum of all shares.
+pub(super) fn cover(catalogue: &Catalogue, frame: &Frame, grid: &RasterGrid) -> (Vec<f32>, f64) {
     let cells_per_step = frame.outline_step_m() / grid.cell_m;
     let shift = grid.corner_shift();
     let place = |p: &[i64; 2]| -> [f64; 2] { std::array::from_fn(|i| p[i] as f64 * cells_per_step + shift[i]) };
@@ -48,10 +52,10 @@ pub(super) fn cover(catalogue: &Catalogue, frame: &Frame, grid: &RasterGrid) -> 
     let shares: Vec<Vec<(usize, f64)>> =
         of_rows.par_iter().map(|crossings| shares_of_row(crossings, grid.columns, &place)).collect();
     let mut cover = vec![0.0; grid.cells()];
-    for (crossings, shares) in of_rows.iter().zip(shares) {
-        shares.iter().for_each(|&(column, share)| cover[grid.index(column, crossings[0].row)] = share);
+    for (crossings, shares) in of_rows.iter().zip(&shares) {
+        shares.iter().for_each(|&(column, share)| cover[grid.index(column, crossings[0].row)] = share as f32);
     }
-    cover
+    (cover, shares.iter().flatten().map(|(_, share)| share).sum())
 }
 
 /// The columns of a row in which anything lies, with the share that is covered.
@@ -73,15 +77,40 @@ fn shares_of_row(
         }
     }
     parts.sort_by_key(|part| part.column);
-    parts.chunk_by(|a, b| a.column == b.column).map(|parts| (parts[0].column, share(parts))).collect()
+    let of_cell = |parts: &[Part]| (parts[0].column, area(parts, [0.0, 0.0], 1.0, HALVINGS).clamp(0.0, 1.0));
+    parts.chunk_by(|a, b| a.column == b.column).map(of_cell).collect()
 }
 
-/// Share of a cell that parts of rings cover.
-fn share(parts: &[Part]) -> f64 {
+/// Area that parts of rings cover, all of which lie in a square of a cell.
+fn area(parts: &[Part], [west, south]: [f64; 2], side: f64, halvings: u32) -> f64 {
     // Rings of one grain do not overlap; holes run clockwise and take away.
     if parts.iter().all(|part| part.grain == parts[0].grain) {
-        return parts.iter().map(|part| signed_area(&part.ring)).sum::<f64>().clamp(0.0, 1.0);
+        return parts.iter().map(|part| signed_area(&part.ring)).sum();
     }
+    if parts.len() > AT_ONCE && halvings > 0 {
+        let half = 0.5 * side;
+        return halves(parts, 0, west + half)
+            .into_iter()
+            .zip([west, west + half])
+            .flat_map(|(column, west)| {
+                halves(&column, 1, south + half).into_iter().zip([[west, south], [west, south + half]])
+            })
+            .map(|(quarter, corner)| area(&quarter, corner, half, halvings - 1))
+            .sum();
+    }
+    union_area(parts)
+}
+
+/// What of the parts lies below a line, and what above it.
+fn halves(parts: &[Part], axis: usize, at: f64) -> [Vec<Part>; 2] {
+    [-1.0, 1.0].map(|sign| {
+        let of_part = |part: &Part| Part { ring: clip(&part.ring, axis, at, sign), ..*part };
+        parts.iter().map(of_part).filter(|part| !part.ring.is_empty()).collect()
+    })
+}
+
+/// Area of the union of rings.
+fn union_area(parts: &[Part]) -> f64 {
     let mut overlay: Overlay<i32> = Overlay::new_custom(256, IntOverlayOptions::ogc(), Solver::default());
     for part in parts {
         let whole = |p: &[f64; 2]| p.map(|share| (share * PARTS).round() as i32);
@@ -94,7 +123,7 @@ fn share(parts: &[Part]) -> f64 {
         let ring: Vec<[f64; 2]> = ring.into_iter().map(|p| [f64::from(p.x) / PARTS, f64::from(p.y) / PARTS]).collect();
         signed_area(&ring)
     };
-    rings.into_iter().flatten().map(area).sum::<f64>().clamp(0.0, 1.0)
+    rings.into_iter().flatten().map(area).sum()
 }
 
 /// The cells, of so many along an axis, that places on it meet; none where there are no places.
@@ -171,6 +200,20 @@ mod tests {
         assert!((share_of(&within) - 0.52).abs() < 1e-6);
         let across = [&ring[..], &[(1, square(20, 40, 20))]].concat();
         assert!((share_of(&across) - 0.50).abs() < 1e-6, "half of it lies on the ring: {}", share_of(&across));
+    }
+
+    #[test]
+    fn hundreds_of_grains_in_a_cell_cover_what_a_count_of_its_points_says() {
+        // Squares over squares, by a rule that repeats itself late.
+        let places = (0..400u64).map(|i| [i * i * 37 % 83, i * 53 % 89].map(|x| x as i64 - 3));
+        let rings: Vec<(usize, Vec<[i64; 2]>)> =
+            places.enumerate().map(|(i, [x, y])| (i, square(x, y, 2 + i as i64 % 7))).collect();
+        let covered = |x: i64, y: i64| {
+            rings.iter().any(|(_, ring)| (ring[0][0]..ring[1][0]).contains(&x) && (ring[0][1]..ring[2][1]).contains(&y))
+        };
+        let count = (0..100).flat_map(|x| (0..100).map(move |y| (x, y))).filter(|&(x, y)| covered(x, y)).count();
+        assert!((2000..9000).contains(&count), "{count}");
+        assert!((share_of(&rings) - count as f64 / 1e4).abs() < 1e-6, "{} is not {count}", share_of(&rings));
     }
 
     #[test]

@@ -10,7 +10,7 @@ use crate::open::Frame;
 
 /// Parts of a map unit in which cells are counted.
 const PARTS: f64 = 1e6;
-/// A raster with more cells than this is refused: seven bands of it would take 1.4 GB.
+/// A raster with more cells than this is refused: seven bands of it take 1.4 GB, and what they are made from about half as much again.
 pub(crate) const MOST_CELLS: u64 = 50_000_000;
 
 /// A raster that cannot be laid out.

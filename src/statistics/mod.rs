@@ -12,4 +12,4 @@ mod summary;
 pub use grid::{RasterError, RasterGrid, automatic_cell_m};
 pub use percentiles::Sizes;
 pub use raster::{Band, GrainSizeRaster, NODATA};
-pub use summary::{BAxis, Summary, near_equant};
+pub use summary::{Areas, BAxis, Summary, near_equant};

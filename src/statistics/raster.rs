@@ -69,13 +69,13 @@ impl GrainSizeRaster {
         let grid = RasterGrid::new(frame, scale, cell_m)?;
         let surveyed = grid.cells_that_meet(surveyed);
         let mut bands = size_bands(catalogue, &grid, settings.min_grains);
-        let cover = cover(catalogue, frame, &grid);
-        let covered_area_m2 = cover.iter().sum::<f64>() * grid.cell_m * grid.cell_m;
+        let (cover, covered_cells) = cover(catalogue, frame, &grid);
+        let covered_area_m2 = covered_cells * grid.cell_m * grid.cell_m;
         bands.push(Band {
             name: "grain_cover",
             unit: "1",
             description: "share of the cell covered by grain outlines in plan, 0 to 1; where they overlap it counts once",
-            values: cover.into_iter().map(|share| share as f32).collect(),
+            values: cover,
         });
         // No grains and no survey are different things.
         for band in &mut bands {

@@ -82,15 +82,18 @@ pub struct Summary {
     pub share_near_equant: Option<f64>,
 }
 
+/// Areas that the catalogue does not tell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Areas {
+    /// The limit that was held against the grains, m².
+    pub smallest_grain_m2: f64,
+    /// In plan under at least one outline, m².
+    pub covered_m2: f64,
+}
+
 impl Summary {
-    /// The summary of a catalogue. `smallest_grain_area_m2` is the limit that was held against the grains,
-    /// `covered_area_m2` the area in plan under at least one of their outlines.
-    pub fn new(
-        catalogue: &Catalogue,
-        settings: &Settings,
-        scale: &Scale,
-        (smallest_grain_area_m2, covered_area_m2): (f64, f64),
-    ) -> Summary {
+    /// The summary of a catalogue.
+    pub fn new(catalogue: &Catalogue, settings: &Settings, scale: &Scale, areas: &Areas) -> Summary {
         let grains = &catalogue.grains;
         let sizes = |axis: usize| Sizes::new(grains.iter().map(|g| g.grain.axes_m[axis]));
         let b = sizes(1);
@@ -115,10 +118,10 @@ impl Summary {
             survey_height_m: size.y,
             survey_box_area_m2: box_area,
             grain_footprint_area_m2: footprint,
-            grain_covered_area_m2: covered_area_m2,
-            grain_cover_of_survey_box: Some(covered_area_m2 / box_area).filter(|c| c.is_finite()),
-            smallest_measurable_grain_area_m2: smallest_grain_area_m2,
-            smallest_measurable_grain_diameter_m: 2.0 * (smallest_grain_area_m2 / PI).sqrt(),
+            grain_covered_area_m2: areas.covered_m2,
+            grain_cover_of_survey_box: Some(areas.covered_m2 / box_area).filter(|c| c.is_finite()),
+            smallest_measurable_grain_area_m2: areas.smallest_grain_m2,
+            smallest_measurable_grain_diameter_m: 2.0 * (areas.smallest_grain_m2 / PI).sqrt(),
             b_axis_area_by_number: BAxis::new(
                 "area-by-number: each grain counts once, linear interpolation (type 7)",
                 |p| b.area_by_number(p),

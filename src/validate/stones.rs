@@ -104,13 +104,14 @@ fn check_order(path: &Path, table: &NumberTable) -> Result<(), ValidateError> {
     }
 }
 
-/// Directions that are no unit vectors at right angles would give angles that mean nothing.
+/// Directions that are no unit vectors at right angles would give angles that mean nothing. A table that has them in columns
+/// instead of rows passes: it cannot be told.
 fn check_directions(path: &Path, directions: &[Option<[DVec3; 3]>]) -> Result<(), ValidateError> {
-    let is_rotation = |[a, b, c]: [DVec3; 3]| {
+    let are_at_right_angles = |[a, b, c]: [DVec3; 3]| {
         let off = [a.dot(a) - 1.0, b.dot(b) - 1.0, c.dot(c) - 1.0, a.dot(b), b.dot(c), c.dot(a)];
         off.iter().all(|off| off.abs() < DIRECTIONS_OFF)
     };
-    match directions.iter().position(|of_row| of_row.is_some_and(|axes| !is_rotation(axes))) {
+    match directions.iter().position(|of_row| of_row.is_some_and(|axes| !are_at_right_angles(axes))) {
         None => Ok(()),
         Some(row) => Err(ValidateError::Field {
             path: path.to_owned(),
@@ -133,6 +134,8 @@ const NUMBER_EXPECTED: &str =
 fn directions(table: &NumberTable) -> Option<Vec<Option<[DVec3; 3]>>> {
     let [a, b, c] = DIRECTIONS.map(|names| table.triples(names));
     let (a, b, c) = (a?, b?, c?);
-    let of_row = |row: usize| Some([a[row]?, b[row]?, c[row]?].map(DVec3::from_array));
+    // Zeros stand for directions that nobody knows.
+    let known = |axes: &[DVec3; 3]| axes.iter().any(|axis| *axis != DVec3::ZERO);
+    let of_row = |row: usize| Some([a[row]?, b[row]?, c[row]?].map(DVec3::from_array)).filter(known);
     Some((0..table.rows).map(of_row).collect())
 }

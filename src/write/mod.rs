@@ -39,7 +39,7 @@ use crate::geometry::PlanBox;
 use crate::index::Scale;
 use crate::open::{Frame, Reach};
 use crate::settings::Settings;
-use crate::statistics::{GrainSizeRaster, Summary};
+use crate::statistics::{Areas, GrainSizeRaster, Summary};
 use crate::stitch::{Catalogue, TileReport};
 use crate::store::fail_point;
 use atomic::Pending;
@@ -106,8 +106,8 @@ pub(crate) fn write_unnamed(
         &results.settings.raster,
         results.surveyed,
     )?;
-    let areas_m2 = (results.smallest_grain_area_m2, raster.covered_area_m2);
-    let summary = Summary::new(results.catalogue, results.settings, results.scale, areas_m2);
+    let areas = Areas { smallest_grain_m2: results.smallest_grain_area_m2, covered_m2: raster.covered_area_m2 };
+    let summary = Summary::new(results.catalogue, results.settings, results.scale, &areas);
     let names = results.names();
     let mut written = Vec::with_capacity(names.len());
     for &name in &names {

@@ -57,7 +57,7 @@ fn a_table_without_what_is_needed_names_column_line_and_text() {
             vec!["line 3", "`r00`", "0.866", "right angles"],
         ),
         (
-            "A,B,C,r00,r01,r02,r10,r11,r12,r20,r21,r22\n3,2,1,0,0,0,0,0,0,0,0,0\n3,2,1,,,,,,,,,\n",
+            "A,B,C,r00,r01,r02,r10,r11,r12,r20,r21,r22\n3,2,1,1,0,0,1,0,0,0,0,1\n3,2,1,,,,,,,,,\n",
             vec!["line 2", "unit vectors"],
         ),
         ("", vec!["`A`"]),

@@ -52,8 +52,8 @@ const LEVEL: f64 = 0.9;
 const PLAIN: f64 = 0.02;
 /// and loses this where it lies twice as deep.
 const HOLLOWNESS: f64 = 0.2;
-/// A level core whose hull is less spherical than this is no stone, however it bends: of a wide sheet of sand without its hollows, which are
-/// valleys, what is left bends downward a little everywhere.
+/// A level core whose hull is less spherical than this, or than half of a `stone_score` that is lower than the default, is no stone,
+/// however it bends: of a wide sheet of sand without its hollows, which are valleys, what is left bends downward a little everywhere.
 const FLATTEST: f64 = 0.3;
 /// What a core that is no stone must score to be part of one.
 const PART: f64 = 0.3;
@@ -108,8 +108,10 @@ fn kind(ground: &Ground, vertices: &[u32], means: &Means, look: &Look) -> Kind {
     }
     let points: Vec<DVec3> = vertices.iter().map(|&v| ground.positions[v as usize]).collect();
     if means.up > LEVEL {
-        let least = sphericity(look.stone_score).max(FLATTEST);
-        if flatter_than(&points, least) {
+        let least = sphericity(look.stone_score);
+        // Who asks for flatter stones than usual gets them.
+        let bar = least.max(FLATTEST.min(0.5 * look.stone_score));
+        if bar > 0.0 && flatter_than(&points, bar) {
             return Kind::Sheet;
         }
         let depth = mean_depth(&points, &points) / means.area_m2.sqrt();

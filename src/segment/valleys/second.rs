@@ -2,7 +2,7 @@
 //!
 //! In the gaps of a crowded bed few cameras see the stones, and the surface is so rough that most of it counts as valley.
 //! What was left over by the first look, and does not face down, is a small mesh of its own: its normals are smoothed more, which
-//! disturbs no neighbour, and the same steps find seeds and cores on it. Then all cores grow together, once more.
+//! disturbs no neighbour, and the same steps find seeds and cores on it. Then growth goes on, with the cores of both.
 
 use super::cores::Cores;
 use super::judge::{Judged, judge};
