@@ -16,8 +16,9 @@ pub struct Growth<'g> {
     ground: &'g Ground<'g>,
     /// How long a step is at each vertex, edges for each edge.
     slowness: Vec<f32>,
-    /// How far cores grow, and how far the others have grown when what is no stone starts, parts.
+    /// How far cores grow, parts.
     reach: u16,
+    /// How far stones have grown when what is no stone starts, parts.
     late: u16,
     spread: Spread,
 }
