@@ -71,7 +71,7 @@ impl Default for ValleySettings {
             stone_score: 0.6,
             join_reach: 1.65,
             join_reach_edges: 32.0,
-            join_rise: 0.02,
+            join_rise: 0.027,
             join_swallowed: 0.1,
             second_passes: 12,
             second_depth: 0.08,

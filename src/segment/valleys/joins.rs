@@ -1,7 +1,7 @@
 //! Joins: cores that are parts of one stone, seen in several patches.
 //!
 //! Two patches of a convex body lie below each other's tangent planes, and nothing else reaches into the hull of both.
-//! They need not touch: what lies in front of a stone may part what is seen of it.
+//! They need not touch: what lies in front of a stone may part what is seen of it, or a ledge across its face.
 
 use super::UNKNOWN;
 use super::bend::GAP_EDGES;
@@ -21,8 +21,11 @@ pub struct Joined {
 }
 
 /// Of two cores, what lies no further beyond the gap than this, as a share of the square root of the smaller one's
-/// area, must agree by itself.
+/// area, must agree by itself, if they do not lie side by side.
 const RIM: f64 = 0.3;
+/// Cores that lie nearer than this share of the square root of the smaller one's area are not asked to agree at their rims: if one
+/// stone has a ledge or a groove, its rims are the flanks of that, and rise over each other however well the rest agrees.
+const BESIDE: f64 = 0.2;
 /// What lies so far within the hull of two cores is inside, mean edge lengths.
 const INSIDE_EDGES: f64 = 1.5;
 
@@ -113,12 +116,13 @@ fn one(
         return None;
     }
     let smaller_m2 = first.area_m2.min(second.area_m2);
-    let rim_m = gap_m + RIM * smaller_m2.sqrt();
-    for widest_m in [f64::INFINITY, rim_m] {
+    let agree = |widest_m: f64| {
         let most = settings.join_rise;
-        if !a.rises_less(&gaps_m[0], widest_m, b, most) || !b.rises_less(&gaps_m[1], widest_m, a, most) {
-            return Some(Some(false));
-        }
+        a.rises_less(&gaps_m[0], widest_m, b, most) && b.rises_less(&gaps_m[1], widest_m, a, most)
+    };
+    let beside = gap_m < BESIDE * smaller_m2.sqrt();
+    if !agree(f64::INFINITY) || !(beside || agree(gap_m + RIM * smaller_m2.sqrt())) {
+        return Some(Some(false));
     }
     let both: Vec<DVec3> = a.points.iter().chain(&b.points).copied().collect();
     let mut bounds = first.bounds;
