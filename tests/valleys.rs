@@ -197,6 +197,40 @@ fn a_level_sheet_is_no_stone_though_what_its_furrows_leave_bends_downward_everyw
     assert_eq!([wide(&furrowed()), wide(&domes(false))], [0, 3]);
 }
 
+/// A dome of a metre whose eastern third lies lower, behind a ledge that gets lower towards the north and ends at some y.
+fn ledged(ledge: f64, end: f64) -> MemorySurface {
+    let n = 140;
+    let mut surface = MemorySurface::default();
+    for j in 0..=n {
+        for i in 0..=n {
+            let [x, y] = [i, j].map(|k| k as f64 / n as f64 - 0.5);
+            let high = ((end - y) / 0.3).clamp(0.0, 1.0);
+            let below = ((x - 0.17) / 0.02).clamp(0.0, 1.0);
+            surface.positions.push(DVec3::new(x, y, -2.0 * (x * x + y * y) - ledge * high * below));
+        }
+    }
+    surface.triangles = grid(n);
+    surface
+}
+
+#[test]
+fn a_dome_with_a_ledge_that_runs_out_on_its_face_is_one_stone_and_with_a_high_one_all_across_it_two() {
+    let segment = SegmentSettings { min_grain_area_m2: 0.02, ..SegmentSettings::default() };
+    // Bridges are cut that are wider than usual, so that the ledge parts what it does not reach.
+    let wide = |ledge: f64, end: f64, join_reach: f64| {
+        let how = (
+            "ledge",
+            segment.clone(),
+            ValleySettings { join_reach, bridge_edges: 5.0, refill_edges: 12.0, ..ValleySettings::default() },
+        );
+        let found = catalogue(&indexed(&ledged(ledge, end), ONE_TILE), &how, ONE_TILE).0;
+        found.grains.iter().filter(|g| g.grain.surface_area_m2 > 0.1).count()
+    };
+    let joined = ValleySettings::default().join_reach;
+    assert_eq!([0.25, 0.3].map(|end| [wide(0.14, end, 0.0), wide(0.14, end, joined)]), [[2, 1]; 2]);
+    assert_eq!(wide(0.3, 1.0, joined), 2);
+}
+
 /// Halos as thin as they come: most of a tile is unknown, and the little that it claims to know must be so. Every grain of
 /// the core is either found, or its lowest triangle is named as unsettled.
 #[test]

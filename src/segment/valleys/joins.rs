@@ -1,7 +1,8 @@
 //! Joins: cores that are parts of one stone, seen in several patches.
 //!
 //! Two patches of a convex body lie below each other's tangent planes, and nothing else reaches into the hull of both.
-//! They need not touch: what lies in front of a stone may part what is seen of it, or a ledge across its face.
+//! They need not touch: what lies in front of a stone may part what is seen of it. Where they do touch, nothing lies between
+//! them but a bridge that was cut, or a ledge that runs out on the face of one stone.
 
 use super::UNKNOWN;
 use super::bend::GAP_EDGES;
@@ -21,11 +22,8 @@ pub struct Joined {
 }
 
 /// Of two cores, what lies no further beyond the gap than this, as a share of the square root of the smaller one's
-/// area, must agree by itself, if they do not lie side by side.
+/// area, must agree by itself, if they do not touch.
 const RIM: f64 = 0.3;
-/// Cores that lie nearer than this share of the square root of the smaller one's area are not asked to agree at their rims: if one
-/// stone has a ledge or a groove, its rims are the flanks of that, and rise over each other however well the rest agrees.
-const BESIDE: f64 = 0.2;
 /// What lies so far within the hull of two cores is inside, mean edge lengths.
 const INSIDE_EDGES: f64 = 1.5;
 
@@ -46,7 +44,7 @@ pub fn join(ground: &Ground, cores: &[u32], judged: &[Judged], seen: &PlanBox, s
             let ahead = order[place + 1..]
                 .iter()
                 .take_while(move |&&other| judged[other].bounds.min[0] <= judged[first].bounds.max[0] + widest_m);
-            let (sure, farthest, blocks) = (&sure, &farthest, &blocks);
+            let (sure, farthest, all) = (&sure, &farthest, (cores, &blocks));
             ahead.filter_map(move |&other| {
                 let (a, b) = (first.min(other), first.max(other));
                 // Of a core that is not whole the reach is not known, but it is not more than that of the other.
@@ -67,7 +65,7 @@ pub fn join(ground: &Ground, cores: &[u32], judged: &[Judged], seen: &PlanBox, s
                     return None;
                 }
                 let pair = [&judged[a], &judged[b]];
-                one(ground, (blocks, [a, b]), pair, (gap_m, sure), settings).map(|one| (a, b, one))
+                one(ground, (all, [a, b]), pair, (gap_m, sure), settings).map(|one| (a, b, one))
             })
         })
         .collect();
@@ -104,7 +102,7 @@ fn grown(bounds: &PlanBox, by_m: f64) -> PlanBox {
 #[allow(clippy::type_complexity, reason = "each is named where it is used")]
 fn one(
     ground: &Ground,
-    (blocks, names): (&Blocks, [usize; 2]),
+    ((cores, blocks), names): ((&[u32], &Blocks), [usize; 2]),
     [first, second]: [&Judged; 2],
     (farthest_m, sure): (f64, &Sure),
     settings: &ValleySettings,
@@ -120,8 +118,9 @@ fn one(
         let most = settings.join_rise;
         a.rises_less(&gaps_m[0], widest_m, b, most) && b.rises_less(&gaps_m[1], widest_m, a, most)
     };
-    let beside = gap_m < BESIDE * smaller_m2.sqrt();
-    if !agree(f64::INFINITY) || !(beside || agree(gap_m + RIM * smaller_m2.sqrt())) {
+    // The rims of cores that touch are the flanks of a ledge, and rise over each other however well the rest agrees.
+    let rims_agree = || agree(gap_m + RIM * smaller_m2.sqrt()) || touch(ground, cores, [first, second], names);
+    if !agree(f64::INFINITY) || !rims_agree() {
         return Some(Some(false));
     }
     let both: Vec<DVec3> = a.points.iter().chain(&b.points).copied().collect();
@@ -139,6 +138,13 @@ fn one(
         }
     }
     Some(Some(swallowed.value() < settings.join_swallowed * smaller_m2))
+}
+
+/// Whether some vertices of two cores are neighbours: no valley lies between them there.
+fn touch(ground: &Ground, cores: &[u32], [first, second]: [&Judged; 2], [a, b]: [usize; 2]) -> bool {
+    let (fewer, other) = if first.vertices.len() <= second.vertices.len() { (first, b) } else { (second, a) };
+    let beside = |v: &u32| ground.neighbours.around(*v as usize).iter().any(|w| cores[*w as usize] as usize == other);
+    fewer.vertices.iter().any(beside)
 }
 
 /// The vertices of all cores in blocks that are small, also those of sheets as wide as the tile.
