@@ -231,6 +231,34 @@ fn a_dome_with_a_ledge_that_runs_out_on_its_face_is_one_stone_and_with_a_high_on
     assert_eq!(wide(0.3, 1.0, joined), 2);
 }
 
+/// A coarse dome that is torn along its middle: each side has vertices of its own at the same places.
+fn torn() -> MemorySurface {
+    let n = 16;
+    let mut surface = MemorySurface { triangles: grid(n), ..MemorySurface::default() };
+    for j in 0..=n {
+        for i in 0..=n {
+            let [x, y] = [i, j].map(|k| k as f64 / n as f64 - 0.5);
+            surface.positions.push(DVec3::new(x, y, -1.2 * (x * x + y * y)));
+        }
+    }
+    let vertices = surface.positions.len() as u64;
+    surface.positions.extend_from_within(..);
+    let east = |t: &[u64; 3]| t.iter().all(|v| v % (n as u64 + 1) >= n as u64 / 2);
+    surface.triangles.iter_mut().filter(|t| east(t)).for_each(|t| *t = t.map(|v| v + vertices));
+    surface
+}
+
+#[test]
+fn a_reach_of_nothing_joins_not_even_the_sides_of_a_tear() {
+    let segment = SegmentSettings { min_grain_area_m2: 0.02, ..SegmentSettings::default() };
+    let grains = |change: fn(&mut ValleySettings)| {
+        let mut valleys = ValleySettings { refill_edges: 12.0, ..ValleySettings::default() };
+        change(&mut valleys);
+        catalogue(&indexed(&torn(), ONE_TILE), &("tear", segment.clone(), valleys), ONE_TILE).0.grains.len()
+    };
+    assert_eq!([grains(|_| ()), grains(|v| v.join_reach = 0.0), grains(|v| v.join_reach_edges = 0.0)], [1, 2, 2]);
+}
+
 /// Halos as thin as they come: most of a tile is unknown, and the little that it claims to know must be so. Every grain of
 /// the core is either found, or its lowest triangle is named as unsettled.
 #[test]

@@ -110,7 +110,8 @@ fn one(
     let [a, b] = [&first.patch, &second.patch];
     let gaps_m = a.gaps_m(b);
     let gap_m = gaps_m[0].iter().copied().fold(f64::INFINITY, f64::min);
-    if gap_m > farthest_m {
+    // Two sides of a tear lie at one place, and a reach of 0 joins none.
+    if gap_m >= farthest_m {
         return None;
     }
     let smaller_m2 = first.area_m2.min(second.area_m2);
