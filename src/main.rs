@@ -84,10 +84,10 @@ fn run_command(args: &RunArgs) -> Result<ExitCode, Error> {
         outcome.segmented_per_triangle,
         outcome.curvature_per_triangle.map_or_else(String::new, |n| format!(", and {n:.2} looked at for curvature"))
     ));
-    if let Some([d16, d50, d84]) = outcome.b_axis_mm() {
-        progress.note(&format!(
-            "b axis, each grain counted once: D16 {d16:.1} mm, D50 {d50:.1} mm, D84 {d84:.1} mm; summary.json has more"
-        ));
+    if let Some([by_number, by_grid]) = outcome.b_axis_mm() {
+        let sizes = |[d16, d50, d84]: [f64; 3]| format!("D16 {d16:.1} mm, D50 {d50:.1} mm, D84 {d84:.1} mm");
+        progress.note(&format!("b axis, each grain counted once: {}; summary.json has more", sizes(by_number)));
+        progress.note(&format!("b axis, as a pebble count at the knots of a grid finds it: {}", sizes(by_grid)));
     }
     if outcome.lost.is_empty() {
         return Ok(ExitCode::Done);

@@ -63,11 +63,14 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// D16, D50 and D84 of the b axis, area-by-number, millimetres; none without grains.
-    pub fn b_axis_mm(&self) -> Option<[f64; 3]> {
+    /// D16, D50 and D84 of the b axis, area-by-number and then grid-by-number, millimetres; none without grains.
+    pub fn b_axis_mm(&self) -> Option<[[f64; 3]; 2]> {
         let sizes = Sizes::new(self.catalogue.grains.iter().map(|g| 1e3 * g.grain.axes_m[1]));
-        let [d16, d50, d84] = [16.0, 50.0, 84.0].map(|percent| sizes.area_by_number(percent));
-        Some([d16?, d50?, d84?])
+        let of = |base: fn(&Sizes, f64) -> Option<f64>| {
+            let [d16, d50, d84] = [16.0, 50.0, 84.0].map(|percent| base(&sizes, percent));
+            Some([d16?, d50?, d84?])
+        };
+        Some([of(Sizes::area_by_number)?, of(Sizes::grid_by_number)?])
     }
 }
 
@@ -142,6 +145,8 @@ pub fn run(job: &Job, progress: &dyn Progress, control: &Control) -> Result<Outc
             control.check()?;
             let room = forecast::index_room(&reach, room, surface.welded_bytes())?;
             let index = make_index(surface.surface(), &work, room, &crew, progress)?;
+            // Nothing of an index is kept that may be partly of another file.
+            reach.check_unchanged(false)?;
             work.note_weld(surface.weld_facts())?;
             work.note_figures(surface.figures().as_ref())?;
             index
@@ -366,9 +371,12 @@ fn write(
     let written = write_unnamed(folder, results, &|_| progress.advance(1));
     progress.end();
     let written = written?;
-    // Extra attributes of a labelled cloud come from its file, which is opened again for them.
-    let opened_again = results.cloud.is_some_and(|reach| matches!(reach.files(), [only] if only.is_las()));
-    reach.check_unchanged(opened_again)?;
+    // Labels go beside what the files hold, which was read once more for them. Extra attributes of a labelled cloud come from
+    // its file, which is opened again.
+    if results.mesh.is_some() || results.cloud.is_some() {
+        let opened_again = results.cloud.is_some_and(|reach| matches!(reach.files(), [only] if only.is_las()));
+        reach.check_unchanged(opened_again)?;
+    }
     control.commit()?;
     Ok(folder.publish(written)?)
 }

@@ -331,6 +331,17 @@ fn json_lines_are_json_and_tell_every_stage_from_begin_to_end() {
     }
     let plain = run(&mesh, &folder.path().join("plain"), &published);
     assert!(plain.err.contains("curvature: ") && !plain.err.contains('\r'), "{}", plain.err);
+    // The sizes that are printed are those of the summary, of both counts.
+    let summary = std::fs::read(folder.path().join("plain/summary.json")).unwrap();
+    let summary: serde_json::Value = serde_json::from_slice(&summary).unwrap();
+    for (count, said) in
+        [("area", "each grain counted once"), ("grid", "as a pebble count at the knots of a grid finds it")]
+    {
+        let mm = |key: &str| 1e3 * summary[format!("b_axis_{count}_by_number")][key].as_f64().unwrap();
+        let [d16, d50, d84] = ["d16_m", "d50_m", "d84_m"].map(mm);
+        let line = format!("b axis, {said}: D16 {d16:.1} mm, D50 {d50:.1} mm, D84 {d84:.1} mm");
+        assert!(plain.err.contains(&line), "`{line}` is not in: {}", plain.err);
+    }
 }
 
 #[test]

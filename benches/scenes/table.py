@@ -15,7 +15,9 @@ def scores(program, scene, out, more):
     limits = ['--max-grain', WIDEST, '--min-grain-area', str(smallest)]
     run = [program, 'run', scene / 'mesh.ply', '-o', out, '--force', '--labelled-mesh', *limits, *more]
     for command in (run, [program, 'validate', out, scene]):
-        subprocess.run(command, check=True, capture_output=True)
+        done = subprocess.run(command, capture_output=True, text=True)
+        if done.returncode:
+            raise SystemExit(f'{" ".join(map(str, command))}\n{done.stderr}')
     return json.loads((out / 'validation.json').read_text())
 
 

@@ -18,6 +18,7 @@ use ply_rs_bw::ply::Encoding;
 use rayon::prelude::*;
 use std::fs::File;
 use std::io::{Seek, SeekFrom, Write};
+use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
@@ -66,6 +67,7 @@ pub(super) fn decode(path: &str, source: &MappedFile, progress: &Progress<'_>) -
     if file.format.has_color && colors == Colors::None {
         warnings.push(Warning::ColorsAllZero { path: path.to_owned() });
     }
+    source.check_not_rewritten(Path::new(path))?;
     let bytes = MappedFile::of_scratch(&scratch, source.stamp()).map_err(|e| unwritten(&file, e))?;
     let header = PlyHeader {
         encoding: Encoding::BinaryLittleEndian,

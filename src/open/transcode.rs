@@ -20,6 +20,7 @@ use super::vertices::AXES;
 use ply_rs_bw::ply::Encoding;
 use std::cell::{Cell, RefCell};
 use std::io::{BufWriter, Write};
+use std::path::Path;
 
 /// Whether a file must be transcoded before its records can be found.
 pub(super) fn is_needed(header: &PlyHeader) -> bool {
@@ -62,6 +63,7 @@ pub(super) fn transcode(
         Encoding::BinaryBigEndian => job.work(BigEndian::new(payload))?,
         Encoding::BinaryLittleEndian => job.work(LittleEndian::new(payload))?,
     };
+    source.bytes.check_not_rewritten(Path::new(source.path))?;
     let bytes = MappedFile::of_scratch(&scratch, source.bytes.stamp()).map_err(|error| OpenError::Scratch {
         path: source.path.to_owned(),
         folder: folder(),
