@@ -4,7 +4,7 @@
 //! A mapped file must not be truncated or rewritten in place while it is open. The system answers a read
 //! beyond the new end with `SIGBUS`, which ends the program; a rewrite changes bytes that were already
 //! validated, so that an index may then be out of range (a panic, never a read outside the map), and is
-//! refused before results are published. Writers
+//! refused before an index of it is kept, and before labels that go back onto it are published. Writers
 //! that replace a file by renaming a new one over it are safe: the map keeps the old one.
 #![allow(unsafe_code)]
 
